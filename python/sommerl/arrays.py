@@ -1,0 +1,82 @@
+"""The one place that knows NumPy from Dr.Jit.
+
+Formulas in this package are written once, on single components (x, y and z of a direction, r, g and b of a
+reflectance), and run on NumPy arrays and on Dr.Jit arrays alike. What differs between the two is here.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+Array = Any  #: a NumPy array or a Dr.Jit array of one number per lane
+Triple = tuple[Array, Array, Array]  #: x, y, z of directions, or r, g, b of reflectances
+
+
+class NumpyOps:
+    """Array functions, on NumPy arrays."""
+
+    sqrt, sin, cos, exp, power = np.sqrt, np.sin, np.cos, np.exp, np.power
+    atan2, floor = np.arctan2, np.floor
+    minimum, maximum = np.minimum, np.maximum
+    where = staticmethod(np.where)
+
+    @staticmethod
+    def to_index(x: Array) -> Array:
+        return np.asarray(x).astype(np.int64)
+
+    @staticmethod
+    def gather(buffer: Any, index: Array) -> Array:
+        """Entry `index` of a flat buffer."""
+        return buffer[index]
+
+
+@dataclass(frozen=True)
+class Packed16:
+    """Unsigned 16-bit integers, two in each entry of a Dr.Jit array of 32 bits: Dr.Jit has none of its own."""
+
+    pairs: Array
+
+
+class DrjitOps:
+    """The same functions, on Dr.Jit arrays."""
+
+    def __init__(self, dr: Any) -> None:
+        self._dr = dr
+        self.sqrt, self.sin, self.cos, self.exp, self.power = dr.sqrt, dr.sin, dr.cos, dr.exp, dr.power
+        self.atan2, self.floor = dr.atan2, dr.floor
+        self.minimum, self.maximum, self.where = dr.minimum, dr.maximum, dr.select
+
+    def to_index(self, x: Array) -> Array:
+        return self._dr.uint32_array_t(type(x))(x)
+
+    def gather(self, buffer: Any, index: Array) -> Array:
+        if isinstance(buffer, Packed16):
+            pair = self._dr.gather(type(buffer.pairs), buffer.pairs, index >> 1)
+            return (pair >> ((index & 1) << 4)) & 0xFFFF
+        value = self._dr.gather(type(buffer), buffer, index)
+        return value if self._dr.is_float_v(value) else type(index)(value)
+
+
+_NUMPY = NumpyOps()
+
+
+def ops(x: Array) -> Any:
+    """The array functions for `x`: those of NumPy, or of Dr.Jit if `x` is one of its arrays."""
+    if type(x).__module__.partition(".")[0] in ("drjit", "mitsuba"):
+        return DrjitOps(sys.modules["drjit"])
+    return _NUMPY
+
+
+def gather3(buffer: Any, index: Array) -> Triple:
+    """Entry `index` of a flat buffer of triples (r0, g0, b0, r1, …)."""
+    gather = ops(index).gather
+    return gather(buffer, 3 * index), gather(buffer, 3 * index + 1), gather(buffer, 3 * index + 2)
+
+
+def split(vectors: Array) -> Triple:
+    """The components of NumPy vectors of shape (..., 3)."""
+    return vectors[..., 0], vectors[..., 1], vectors[..., 2]

@@ -1,0 +1,51 @@
+"""What every material is: an object that answers `eval(wi, wo)`.
+
+Conventions: directions are unit vectors in the surface frame, z along the normal; `wi` points to the light,
+`wo` to the viewer. f_r [1/sr] is linear RGB (Rec. 709 primaries), without the cosine, and 0 if a direction is
+below the horizon.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .arrays import Triple, split
+
+Buffers = Mapping[str, Any]
+
+
+class Brdf(ABC):
+    """An isotropic BRDF. A subclass gives one formula, which runs on NumPy and on Dr.Jit arrays."""
+
+    name: str
+
+    def buffers(self) -> dict[str, NDArray[Any]]:
+        """The flat NumPy arrays that `f_r` reads, by name; a renderer uploads them once."""
+        return {}
+
+    @abstractmethod
+    def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
+        """Linear RGB [1/sr] for components of directions above the horizon.
+
+        buffers: those of `buffers()`, as they are or uploaded to the device that holds `wi` and `wo`.
+        """
+
+    def eval(self, wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float64]:
+        """f_r [1/sr], linear RGB, shape (..., 3), for unit directions `wi` and `wo` of shape (..., 3).
+
+        Shapes broadcast. Zero where either direction is not above the horizon. Raises ValueError for other
+        shapes.
+        """
+        light, viewer = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+        if light.shape[-1:] != (3,) or viewer.shape[-1:] != (3,):
+            raise ValueError(f"eval: expected directions of shape (..., 3), found {light.shape} and {viewer.shape}")
+        light, viewer = np.broadcast_arrays(light, viewer)
+        above = (light[..., 2] > 0) & (viewer[..., 2] > 0)
+        result = np.zeros(light.shape)
+        result[above] = np.stack(self.f_r(split(light[above]), split(viewer[above]), self.buffers()), axis=-1)
+        return result

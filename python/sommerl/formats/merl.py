@@ -1,0 +1,60 @@
+"""MERL .binary files (Matusik et al. 2003): three int32 dimensions, then the planes R, G, B in float64.
+
+Cell number = φ_d + n_φ (θ_d + 90 θ_h); f_r = stored × (1, 1.15, 1.66) / 1500. Files with 360 bins in φ_d hold
+data that is not reciprocal.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import FormatError
+from ..files import atomic_write
+from ..lattice import Lattice
+from ..table import BrdfTable
+
+LATTICES = {(90, 90, 180): Lattice(), (90, 90, 360): Lattice(phi_d=360, reciprocal=False)}
+SCALE = np.array([1.0, 1.15, 1.66]) / 1500.0
+HEADER_BYTES = 12
+BELOW_HORIZON = -1.0  # what the stored planes hold where nothing can be measured
+
+
+def looks_like(head: bytes) -> bool:
+    """Whether a file that starts with these 12 bytes says that it is a MERL table."""
+    return len(head) >= HEADER_BYTES and _dimensions(head) in LATTICES
+
+
+def read(path: Path) -> BrdfTable:
+    """The table in a MERL file. Raises FormatError if it is not one, MaterialError if nothing in it is positive."""
+    data = path.read_bytes()
+    if len(data) < HEADER_BYTES:
+        raise FormatError(f"{path}: expected a MERL header of {HEADER_BYTES} bytes, found {len(data)}")
+    dimensions = _dimensions(data)
+    if dimensions not in LATTICES:
+        known = " or ".join("×".join(map(str, known)) for known in LATTICES)
+        raise FormatError(f"{path}: expected MERL dimensions {known}, found {'×'.join(map(str, dimensions))}")
+    lattice = LATTICES[dimensions]
+    expected = HEADER_BYTES + 3 * 8 * lattice.size
+    if len(data) != expected:
+        raise FormatError(f"{path}: expected {expected} bytes for these dimensions, found {len(data)}")
+    planes = np.frombuffer(data, "<f8", offset=HEADER_BYTES).reshape(3, *lattice.shape)
+    values = np.moveaxis(planes, 0, -1) * SCALE
+    return BrdfTable(values, lattice, name=path.stem, source_sha256=hashlib.sha256(data).hexdigest())
+
+
+def write(table: BrdfTable, path: Path) -> None:
+    """Writes a table in MERL's format. Raises FormatError if it has another lattice."""
+    if table.lattice not in LATTICES.values():
+        raise FormatError(f"{path}: expected a MERL lattice, found {table.lattice}")
+    stored = np.where(table.lattice.above_horizon[..., None], table.values / SCALE, BELOW_HORIZON)
+    with atomic_write(path) as out:
+        out.write(np.array(table.lattice.shape, "<i4").tobytes())
+        for channel in range(3):
+            out.write(stored[..., channel].astype("<f8").tobytes())
+
+
+def _dimensions(head: bytes) -> tuple[int, ...]:
+    return tuple(np.frombuffer(head[:HEADER_BYTES], "<i4").tolist())

@@ -1,0 +1,3 @@
+from pathlib import Path
+from .formats import merl
+def load(what): return merl.read(Path(what))

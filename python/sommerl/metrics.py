@@ -1,0 +1,137 @@
+"""How far a candidate is from a reference: on tables, and on rendered images.
+
+Image metrics judge what a viewer sees: 8-bit sRGB pixels at an exposure taken from the reference.
+"""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import MaterialError, MissingDependencyError
+from .lattice import Lattice
+
+EXPOSURE_PERCENTILE, EXPOSED_TO = 90, 0.6
+LOG_FLOOR = 1e-3  # [1/sr]: reflectances well below it count as black in the log error
+PEAK_LUMINANCE = 100.0  # cd/m², of the display that shows the 8-bit image
+
+Pixels = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class TableMetrics:
+    """Distances between two tables over their cells above the horizon, all channels together.
+
+    rmse: root of the mean squared difference [1/sr].
+    log_error_cosine: root of the mean squared difference of log(f_r + 0.001), each cell weighted by its solid angles
+        times cos θ_i cos θ_o: an error over the hemisphere and not over bins.
+    relative_error: ‖candidate - reference‖ / ‖reference‖ (L2).
+    """
+
+    rmse: float
+    log_error_cosine: float
+    relative_error: float
+
+
+def table_metrics(
+    reference: NDArray[np.float64], candidate: NDArray[np.float64], lattice: Lattice
+) -> TableMetrics:
+    """Compares f_r of two tables of shape `lattice.shape + (3,)`."""
+    above = lattice.above_horizon
+    cos_i, cos_o = (cosine[above] for cosine in lattice.cosines())
+    weight = lattice.solid_angles()[above] * cos_i * cos_o
+    a, b = reference[above], candidate[above]
+    squared = (b - a) ** 2
+    log_squared = (np.log(b + LOG_FLOOR) - np.log(a + LOG_FLOOR)) ** 2
+    return TableMetrics(
+        rmse=float(np.sqrt(squared.mean())),
+        log_error_cosine=float(np.sqrt(np.average(log_squared.mean(axis=-1), weights=weight))),
+        relative_error=float(np.sqrt(squared.sum() / (a**2).sum())),
+    )
+
+
+@dataclass(frozen=True)
+class ImageMetrics:
+    """Distances between two images at the reference's exposure. PSNRs are inf for identical images.
+
+    psnr_object_db, psnr_frame_db: over the object's pixels, and over all; 8-bit sRGB, three channels together.
+    ssim: structural similarity (Wang et al. 2004), delta_e_itp: ΔE_ITP (ITU-R BT.2124) on a display of 100 cd/m²,
+    flip: ꟻLIP (Andersson et al. 2020): means over the object's pixels.
+    """
+
+    psnr_object_db: float
+    psnr_frame_db: float
+    ssim: float
+    delta_e_itp: float
+    flip: float
+
+
+def image_metrics(reference: Pixels, candidate: Pixels, mask: Mask) -> ImageMetrics:
+    """Compares linear images of shape (height, width, 3); mask (height, width) says where the object is.
+
+    Raises MissingDependencyError without the packages of sommerl[render].
+    """
+    scale = exposure(reference, mask)
+    a, b = to_srgb8(reference * scale), to_srgb8(candidate * scale)
+    return ImageMetrics(psnr(a[mask], b[mask]), psnr(a, b), ssim(a, b, mask), delta_e_itp(a, b, mask), flip(a, b, mask))
+
+
+def exposure(reference: Pixels, mask: Mask) -> float:
+    """The factor that brings the 90th percentile of the object's pixels' mean channel to 0.6."""
+    level = float(np.percentile(reference[mask].mean(axis=-1), EXPOSURE_PERCENTILE)) if mask.any() else 0.0
+    if not (np.isfinite(level) and level > 0):
+        raise MaterialError("exposure: expected an object that reflects light, found none in the reference image")
+    return EXPOSED_TO / level
+
+
+def to_srgb8(linear: Pixels) -> NDArray[np.uint8]:
+    """Linear RGB, clipped to [0, 1], as 8-bit sRGB (IEC 61966-2-1)."""
+    x = np.clip(linear, 0, 1)
+    encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+    return np.round(255 * encoded).astype(np.uint8)
+
+
+def psnr(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float:
+    """Peak signal-to-noise ratio of 8-bit values [dB]."""
+    mse = float(np.mean((a.astype(np.float64) - b) ** 2))
+    return 10 * np.log10(255**2 / mse).item() if mse > 0 else float("inf")
+
+
+def ssim(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: Mask) -> float:
+    """Mean structural similarity over the mask."""
+    kept: Any = _kept("skimage.metrics", "scikit-image")
+    _, similarity = kept.structural_similarity(a, b, channel_axis=-1, data_range=255, full=True)
+    return float(similarity[mask].mean())
+
+
+def delta_e_itp(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: Mask) -> float:
+    """Mean ΔE_ITP over the mask."""
+    kept: Any = _kept("colour", "colour-science")
+
+    def ictcp(image: NDArray[np.uint8]) -> Any:
+        linear = kept.cctf_decoding(image[mask] / 255.0, function="sRGB")
+        wide = kept.RGB_to_RGB(linear, "sRGB", "ITU-R BT.2020")
+        return kept.RGB_to_ICtCp(np.clip(wide, 0, None) * PEAK_LUMINANCE)
+
+    return float(np.mean(kept.delta_E(ictcp(a), ictcp(b), method="ITP")))
+
+
+def flip(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: Mask) -> float:
+    """Mean ꟻLIP over the mask, at the tool's default viewing distance (67 pixels per degree)."""
+    kept: Any = _kept("flip_evaluator", "flip-evaluator")
+    difference, _, _ = kept.evaluate(
+        (a / 255.0).astype(np.float32), (b / 255.0).astype(np.float32), "LDR", applyMagma=False, computeMeanError=False
+    )
+    return float(np.asarray(difference)[..., 0][mask].mean())
+
+
+def _kept(module: str, package: str) -> Any:
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise MissingDependencyError(f"image metrics need {package}: install sommerl[render]") from error

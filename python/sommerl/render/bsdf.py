@@ -1,0 +1,103 @@
+"""A Mitsuba BSDF for any `Brdf`."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Packed16
+from ..brdf import Brdf
+from ..load import load
+from ..sampling import BlinnPhongSampler
+from .llvm import drjit, mitsuba
+
+
+def make_bsdf(brdf: Brdf, sampler: BlinnPhongSampler | None = None) -> Any:
+    """A Mitsuba BSDF, to be put into a scene's dictionary. Only its front side reflects.
+
+    sampler: of directions; fitted to `brdf` if None. Give the reference's to every candidate that it is compared
+    with, so that all are rendered with the same directions.
+    """
+    return _plugin()(mitsuba().Properties(), brdf, sampler or BlinnPhongSampler.fitted(brdf))
+
+
+def register() -> None:
+    """Makes the plug-in `sommerl` known to scene files; its property `filename` is a path or a built-in's name."""
+    mitsuba().register_bsdf("sommerl", lambda props: _from_file(props))  # pyright: ignore
+
+
+def _from_file(props: Any) -> Any:
+    brdf = load(str(props["filename"]))
+    return _plugin()(props, brdf, BlinnPhongSampler.fitted(brdf))
+
+
+def upload(buffer: NDArray[Any]) -> Any:
+    """A flat NumPy buffer as the array that Dr.Jit gathers from; in scalar mode, as it is."""
+    mi, dr = mitsuba(), drjit()
+    if mi.variant().startswith("scalar"):
+        return buffer
+    match buffer.dtype:
+        case np.uint8:
+            return dr.uint8_array_t(mi.Float)(buffer)
+        case np.uint16:
+            return Packed16(mi.UInt32(np.append(buffer, np.zeros(len(buffer) % 2, np.uint16)).view("<u4")))
+        case _:
+            array = mi.Float(buffer.astype(np.float32))
+            dr.make_opaque(array)
+            return array
+
+
+@cache
+def _plugin() -> Any:
+    """The class, which exists only once a variant is set."""
+    mi, dr = mitsuba(), drjit()
+
+    class SommerlBsdf(mi.BSDF):
+        def __init__(self, props: Any, brdf: Brdf, sampler: BlinnPhongSampler) -> None:
+            mi.BSDF.__init__(self, props)
+            self._brdf = brdf
+            self._buffers = {name: upload(buffer) for name, buffer in brdf.buffers().items()}
+            # Opaque, so that materials which differ in these numbers alone share one compiled kernel.
+            self._sampler = BlinnPhongSampler(
+                dr.opaque(mi.Float, float(sampler.exponent)), dr.opaque(mi.Float, float(sampler.specular))
+            )
+            self.m_components = [mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide]
+            self.m_flags = self.m_components[0]
+
+        def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
+            wi, pdf = self._sampler.sample(_triple(si.wi), (sample1, sample2.x, sample2.y))
+            sample = dr.zeros(mi.BSDFSample3f)
+            sample.wo = mi.Vector3f(*wi)
+            sample.pdf = dr.select(active, pdf, 0.0)
+            sample.eta = 1.0
+            sample.sampled_type = +mi.BSDFFlags.GlossyReflection
+            sample.sampled_component = 0
+            drawn = sample.pdf > 0.0
+            value = self.eval(ctx, si, sample.wo, active & drawn)
+            return sample, dr.select(drawn, value / dr.select(drawn, sample.pdf, 1.0), 0.0)
+
+        def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            above = active & (si.wi.z > 0.0) & (wo.z > 0.0)
+            # Mitsuba's wi is the viewer's direction. What lies in inactive lanes may not even be a number.
+            viewer = dr.select(above, si.wi, mi.Vector3f(0.0, 0.0, 1.0))
+            light = dr.select(above, wo, mi.Vector3f(0.0, 0.0, 1.0))
+            f_r = self._brdf.f_r(_triple(light), _triple(viewer), self._buffers)
+            return dr.select(above, mi.Color3f(*f_r) * light.z, 0.0)
+
+        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return dr.select(active, self._sampler.pdf(_triple(wo), _triple(si.wi)), 0.0)
+
+        def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
+
+        def to_string(self) -> str:
+            return f"SommerlBsdf[{self._brdf.name}]"
+
+    return SommerlBsdf
+
+
+def _triple(v: Any) -> Any:
+    return v.x, v.y, v.z

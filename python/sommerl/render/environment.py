@@ -1,0 +1,58 @@
+"""Environments that light a scene: latitude-longitude images in linear RGB."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FormatError
+from .llvm import mitsuba
+
+# Elevation [degrees], azimuth [degrees, 0 behind the camera, growing to its right], angular size σ [degrees], radiance.
+LIGHTS = (
+    (35.0, -75.0, 18.0, (2.6, 2.4, 2.1)),
+    (55.0, 40.0, 7.0, (14.0, 13.0, 12.0)),
+    (20.0, 75.0, 2.5, (60.0, 66.0, 75.0)),
+    (48.0, -25.0, 0.9, (520.0, 480.0, 420.0)),
+    (-15.0, 115.0, 5.0, (7.0, 4.5, 2.6)),
+)
+GROUND, HORIZON, ZENITH = (0.07, 0.06, 0.05), (0.26, 0.27, 0.29), (0.10, 0.16, 0.30)
+
+
+def default_environment(height: int = 512) -> NDArray[np.float32]:
+    """The environment that needs no download: a dim sky, and five lights from large and soft to small and very bright.
+
+    Returns radiance of shape (height, 2 · height, 3). The first row is the zenith; the middle column is behind the
+    camera of the scenes here. Each light is a Gaussian in angle.
+    """
+    elevation = np.pi / 2 - (np.arange(height) + 0.5) / height * np.pi
+    azimuth = (np.arange(2 * height) + 0.5) / height * np.pi - np.pi
+    azimuth, elevation = np.meshgrid(azimuth, elevation)
+    up = np.sin(elevation)[..., None]
+    sky = np.array(HORIZON) + (np.array(ZENITH) - HORIZON) * np.clip(up, 0, 1)
+    blend = np.clip(0.5 + up / 0.1, 0, 1)  # a soft horizon, 6 degrees high
+    radiance = blend * sky + (1 - blend) * np.array(GROUND)
+    for light_elevation, light_azimuth, sigma, colour in LIGHTS:
+        at, around, sigma = np.radians((light_elevation, light_azimuth, sigma))
+        cosine = np.sin(elevation) * np.sin(at) + np.cos(elevation) * np.cos(at) * np.cos(azimuth - around)
+        angle = np.arccos(np.clip(cosine, -1, 1))
+        radiance = radiance + np.exp(-0.5 * (angle / sigma) ** 2)[..., None] * np.array(colour)
+    return radiance.astype(np.float32)
+
+
+def load_environment(path: Path) -> NDArray[np.float32]:
+    """A latitude-longitude image (OpenEXR, Radiance HDR …), linear RGB, of shape (height, width, 3).
+
+    Raises FormatError if it cannot be read or holds values that no light has.
+    """
+    mi = mitsuba()
+    try:
+        bitmap = mi.Bitmap(str(path)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False)
+    except RuntimeError as error:
+        raise FormatError(f"{path}: expected an environment image, found something unreadable") from error
+    radiance = np.array(bitmap)
+    if not (np.isfinite(radiance).all() and (radiance >= 0).all() and radiance.any()):
+        raise FormatError(f"{path}: expected finite, non-negative radiance, found other values or only black")
+    return radiance

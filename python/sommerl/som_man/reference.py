@@ -1,0 +1,79 @@
+"""The kernels of the method again, in plain NumPy: the executable specification of the Rust core.
+
+Same classes, functions and contracts as `sommerl._core` (see `_core.pyi`), and the same results bit for bit: all
+arithmetic is on float32, one operation after the other as written. Far too slow for a whole table.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+STORED = 3
+EMPTY = 2**32 - 1
+
+F32 = NDArray[np.float32]
+
+
+def squared_distance(x: F32, c: F32) -> F32:
+    """Squared Euclidean distance along the last axis, summed as (r² + g²) + b²."""
+    d = x - c
+    return (d[..., 0] * d[..., 0] + d[..., 1] * d[..., 1]) + d[..., 2] * d[..., 2]
+
+
+class Learner:
+    """Units of the SOM and their MANs, in training (phases 1 and 2)."""
+
+    def __init__(self, triples: F32, weights: F32, rule: Literal["paper", "kohonen"], columns: int) -> None:
+        self._x = triples
+        self._c = weights.copy()
+        self._stored = np.full((len(weights), STORED), EMPTY, np.uint32)
+        self._rule = rule
+        self._columns = columns
+
+    def present(self, cells: NDArray[np.uint32], alpha: float, falloff: F32) -> float:
+        total = 0.0
+        for cell in cells:
+            x = self._x[cell]
+            squared = squared_distance(x, self._c)  # Eq. 1
+            winner = int(squared.argmin())
+            total += float(np.sqrt(np.float64(squared[winner])))
+            self._learn(winner, x, np.float32(alpha), falloff)
+            self._attract(winner, x, cell, np.float32(alpha))
+        return total
+
+    def _learn(self, winner: int, x: F32, alpha: np.float32, falloff: F32) -> None:
+        row, column = divmod(winner, self._columns)
+        for unit in range(len(self._c)):
+            down, across = abs(unit // self._columns - row), abs(unit % self._columns - column)
+            if max(down, across) < len(falloff):
+                weight = falloff[down] * falloff[across]
+                self._move(unit, x, alpha if unit == winner else alpha * weight)
+
+    def _attract(self, winner: int, x: F32, cell: np.uint32, alpha: np.float32) -> None:
+        c, stored = self._c[winner], self._stored[winner]
+        distances = [
+            np.float32(np.inf) if original == EMPTY else squared_distance(self._x[original], c) for original in stored
+        ]
+        farthest = int(np.argmax(distances))  # Eq. 3
+        if squared_distance(x, c) <= distances[farthest]:  # Eq. 5
+            stored[farthest] = cell  # Eq. 4
+        self._move(winner, self._x[stored[farthest]], alpha)  # Eq. 6
+
+    def _move(self, unit: int, x: F32, alpha: np.float32) -> None:
+        rate = alpha * x if self._rule == "paper" else alpha
+        self._c[unit] = self._c[unit] + rate * (x - self._c[unit])  # Eq. 2
+
+    def weights(self) -> F32:
+        return self._c.copy()
+
+    def stored_cells(self) -> NDArray[np.uint32]:
+        return self._stored.copy()
+
+
+def query(triples: F32, lut: F32) -> NDArray[np.uint32]:
+    """The nearest entry of lut (M, 3), the lowest one of several, for each of triples (n, 3): phase 3."""
+    nearest = [squared_distance(x, lut).argmin() for x in triples]
+    return np.array(nearest, np.uint32)

@@ -1,0 +1,72 @@
+"""BrdfTable: one reflectance for each cell of a lattice."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .arrays import Triple, gather3
+from .brdf import Brdf, Buffers
+from .errors import MaterialError
+from .half_diff import directions
+from .lattice import MERL, Interpolation, Lattice
+
+
+class BrdfTable(Brdf):
+    """A measured or sampled isotropic BRDF.
+
+    values: f_r [1/sr], linear RGB, float64, of shape `lattice.shape + (3,)`. Above the horizon, negative and
+        non-finite values of the input become 0 and are counted in `cells_clamped`; cells below the horizon,
+        which hold no measurement, continue the last cell above it (`Lattice.extended`).
+    interpolation: "trilinear", or "nearest" as in the paper.
+    source_sha256: of the file that the table was read from; of the values where there is none.
+
+    Raises MaterialError if the shape is not the lattice's, or nothing above the horizon is positive.
+    """
+
+    def __init__(
+        self,
+        values: ArrayLike,
+        lattice: Lattice = MERL,
+        *,
+        name: str = "table",
+        interpolation: Interpolation = "trilinear",
+        source_sha256: str | None = None,
+    ) -> None:
+        f_r = np.array(values, np.float64)
+        if f_r.shape != (*lattice.shape, 3):
+            raise MaterialError(f"{name}: expected values of shape {(*lattice.shape, 3)}, found {f_r.shape}")
+        unusable = (~np.isfinite(f_r) | (f_r < 0)) & lattice.above_horizon[..., None]
+        f_r[unusable] = 0.0
+        if not (f_r[lattice.above_horizon] > 0).any():
+            raise MaterialError(f"{name}: expected a positive reflectance above the horizon, found none")
+        self.name = name
+        self.lattice = lattice
+        self.interpolation: Interpolation = interpolation
+        self.cells_clamped = int(unusable.any(axis=-1).sum())
+        self.values: NDArray[np.float64] = lattice.extended(f_r).astype(np.float64)
+        self.source_sha256 = source_sha256 or hashlib.sha256(self.values.astype("<f8").tobytes()).hexdigest()
+
+    @classmethod
+    def sample(cls, brdf: Brdf, lattice: Lattice = MERL) -> BrdfTable:
+        """The table of a BRDF's values at the cell centres above the horizon."""
+        above = lattice.above_horizon
+        wi, wo = directions(*(angle[above] for angle in lattice.angles()))
+        values = np.zeros((*lattice.shape, 3))
+        values[above] = brdf.eval(np.stack(wi, -1), np.stack(wo, -1))
+        return cls(values, lattice, name=brdf.name)
+
+    def with_interpolation(self, interpolation: Interpolation) -> BrdfTable:
+        """The same cells, looked up in another way."""
+        other = object.__new__(BrdfTable)
+        other.__dict__.update(self.__dict__, interpolation=interpolation)
+        return other
+
+    def buffers(self) -> dict[str, NDArray[Any]]:
+        return {"values": self.values.reshape(-1)}
+
+    def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
+        return self.lattice.lookup(wi, wo, self.interpolation, lambda cell: gather3(buffers["values"], cell))
