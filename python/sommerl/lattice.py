@@ -49,27 +49,32 @@ class Lattice:
         """The period of φ_d [rad]."""
         return TWO_PI / 2 if self.reciprocal else TWO_PI
 
-    def angles(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """(θ_h, θ_d, φ_d) [rad] at the centre of every cell, each of the lattice's shape."""
+    def axes(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """(θ_h, θ_d, φ_d) [rad] at the centres of the bins, of shapes that broadcast to the lattice's."""
         theta_h = ((np.arange(self.theta_h) + 0.5) / self.theta_h) ** 2 * HALF_PI
         theta_d = (np.arange(self.theta_d) + 0.5) / self.theta_d * HALF_PI
         phi_d = (np.arange(self.phi_d) + 0.5) / self.phi_d * self.phi_d_range
-        theta_h, theta_d, phi_d = np.meshgrid(theta_h, theta_d, phi_d, indexing="ij")
+        return theta_h[:, None, None], theta_d[None, :, None], phi_d[None, None, :]
+
+    def angles(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """(θ_h, θ_d, φ_d) [rad] at the centre of every cell, each of the lattice's shape."""
+        theta_h, theta_d, phi_d = np.broadcast_arrays(*self.axes())
         return theta_h, theta_d, phi_d
+
+    def cosines(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """cos θ_i and cos θ_o at the centre of every cell, each of the lattice's shape."""
+        theta_h, theta_d, phi_d = self.axes()
+        along_normal = np.cos(theta_h) * np.cos(theta_d)
+        tilt = (np.sin(theta_h) * np.sin(theta_d)) * np.cos(phi_d)
+        return along_normal - tilt, along_normal + tilt
 
     @cached_property
     def above_horizon(self) -> NDArray[np.bool_]:
         """Cells with both directions above the horizon at their centre, of the lattice's shape.
 
-        cos θ_d cos θ_h > |sin θ_d cos φ_d sin θ_h|; so for each (θ_h, φ_d) they are the first few in θ_d.
+        They are those with cos θ_h cos θ_d > |sin θ_h sin θ_d cos φ_d|: for each (θ_h, φ_d), the first few in θ_d.
         """
-        cos_i, cos_o = self.cosines()
-        return np.minimum(cos_i, cos_o) > 0
-
-    def cosines(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """cos θ_i and cos θ_o at the centre of every cell, each of the lattice's shape."""
-        wi, wo = directions(*self.angles())
-        return wi[2], wo[2]
+        return np.minimum(*self.cosines()) > 0
 
     def solid_angles(self) -> NDArray[np.float64]:
         """dω_i dω_o of every cell, up to a constant factor: sin θ_h sin θ_d cos θ_d dθ_h (Rusinkiewicz 1998)."""

@@ -32,18 +32,17 @@ class BlinnPhongSampler:
 
     @classmethod
     def fitted(cls, brdf: Brdf) -> BlinnPhongSampler:
-        """The sampler whose lobe has the half-width of the material's highlight, and about its share of the light."""
-        theta_h = np.concatenate([[0.0], np.geomspace(1e-3, 1.3, 400)])
+        """The sampler whose lobe holds half of the highlight's light within the angle that the material's does."""
+        theta_h = np.linspace(0.0, 1.4, 1401) ** 2 / 1.4
         wi, wo = directions(theta_h, np.full_like(theta_h, PI / 8), np.full_like(theta_h, PI / 2))
         f_r = brdf.eval(np.stack(wi, -1), np.stack(wo, -1)).mean(axis=-1)
         base = f_r.min()
-        lobe = f_r - base
-        beyond = np.flatnonzero(lobe <= lobe[0] / 2)
-        half_width = theta_h[beyond[0]] if len(beyond) and beyond[0] else theta_h[-1]
-        exponent = min(SHARPEST, max(1.0, math.log(0.5) / math.log(math.cos(half_width))))
+        light = (f_r - base) * np.sin(2 * theta_h) * np.gradient(theta_h)
+        half = theta_h[np.searchsorted(np.cumsum(light), light.sum() / 2)]
+        exponent = min(SHARPEST, max(1.0, math.log(0.5) / math.log(math.cos(max(half, 1e-3))) - 1))
         # A half vector's solid angle maps to one about four times as large around the light's direction.
-        specular = 4 * lobe[0] * TWO_PI / (exponent + 1)
-        return cls(exponent, min(0.9, max(0.1, specular / (specular + PI * base + 1e-9))))
+        lobe = 4 * PI * light.sum()
+        return cls(exponent, min(0.9, max(0.1, lobe / (lobe + PI * base + 1e-9))))
 
     def sample(self, wo: Triple, u: Triple) -> tuple[Triple, Array]:
         """A direction wi for uniform random numbers u in [0, 1)³, and its density [1/sr].
