@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
 
 @contextmanager
-def atomic_write(path: Path) -> Iterator[BinaryIO]:
+def atomic_write(path: Path) -> Generator[BinaryIO]:
     """A file to write to that takes the name `path` when, and only when, the block ends without an error.
 
     Raises OSError if it cannot be written; whatever had that name before is then still there.
@@ -27,3 +28,13 @@ def atomic_write(path: Path) -> Iterator[BinaryIO]:
     except BaseException:
         os.unlink(temporary)
         raise
+
+
+def check_writable(path: Path) -> None:
+    """Raises OSError now if a file of that name could not be written later, after long work."""
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, "expected a file to write, found a directory", str(path))
+    if not path.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, f"cannot be written: there is no folder {path.parent}", str(path))
+    with tempfile.TemporaryFile(dir=path.parent):
+        pass

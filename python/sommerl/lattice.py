@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Array, Triple, ops
-from .half_diff import TWO_PI, directions, half_diff
+from .half_diff import TWO_PI, half_diff
 
 Interpolation = Literal["nearest", "trilinear"]
 INTERPOLATIONS: tuple[Interpolation, ...] = ("nearest", "trilinear")
@@ -81,7 +81,7 @@ class Lattice:
         theta_h, theta_d, _ = self.angles()
         return np.sin(theta_h) * np.sqrt(theta_h) * np.sin(theta_d) * np.cos(theta_d)
 
-    def extended(self, values: NDArray[np.generic]) -> NDArray[np.generic]:
+    def extended(self, values: NDArray[Any]) -> NDArray[Any]:
         """`values`, of the lattice's shape (…), with every cell below the horizon set to the last one above it in θ_d.
 
         A pair of directions just above the horizon may fall into a cell whose centre is below it, or have such

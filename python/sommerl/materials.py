@@ -1,7 +1,8 @@
 """Built-in materials: stand-ins for ten measured ones, so that everything runs with no download.
 
 Each is the Shifted Gamma fit of a material in the MERL database (parameters published with Bagher et al. 2012; see
-`models/sgd.py`). They are smooth approximations and not measurements, and are called SGD stand-ins wherever they appear.
+`models/sgd.py`). They are smooth approximations and not measurements, and are called SGD stand-ins wherever they
+appear.
 """
 
 from __future__ import annotations
@@ -142,7 +143,7 @@ _FITS: dict[str, tuple[tuple[float, float, float], ...]] = {
         (-0.743686, -0.180435, -1.0),
         (4642.1, 4726.66, 10421.9),
         (3.8545, 4.44817, 5.40959),
-        (5.30781e-08, 1.04045e-07, 1.79834e+66),
+        (5.30781e-08, 1.04045e-07, 1.79834e66),
         (354.965, 349.356, 272.736),
         (0.526796, 0.528469, 1.00293),
     ),

@@ -6,6 +6,7 @@ Image metrics judge what a viewer sees: 8-bit sRGB pixels at an exposure taken f
 from __future__ import annotations
 
 import importlib
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,9 +39,7 @@ class TableMetrics:
     relative_error: float
 
 
-def table_metrics(
-    reference: NDArray[np.float64], candidate: NDArray[np.float64], lattice: Lattice
-) -> TableMetrics:
+def table_metrics(reference: NDArray[np.float64], candidate: NDArray[np.float64], lattice: Lattice) -> TableMetrics:
     """Compares f_r of two tables of shape `lattice.shape + (3,)`."""
     above = lattice.above_horizon
     cos_i, cos_o = (cosine[above] for cosine in lattice.cosines())
@@ -118,7 +117,8 @@ def delta_e_itp(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: Mask) -> float
         wide = kept.RGB_to_RGB(linear, "sRGB", "ITU-R BT.2020")
         return kept.RGB_to_ICtCp(np.clip(wide, 0, None) * PEAK_LUMINANCE)
 
-    return float(np.mean(kept.delta_E(ictcp(a), ictcp(b), method="ITP")))
+    distances: NDArray[np.float64] = kept.delta_E(ictcp(a), ictcp(b), method="ITP")
+    return float(distances.mean())
 
 
 def flip(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: Mask) -> float:
@@ -132,6 +132,8 @@ def flip(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: Mask) -> float:
 
 def _kept(module: str, package: str) -> Any:
     try:
-        return importlib.import_module(module)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # colour-science tells everybody that it could plot, too
+            return importlib.import_module(module)
     except ImportError as error:
         raise MissingDependencyError(f"image metrics need {package}: install sommerl[render]") from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -47,7 +48,7 @@ class BrdfTable(Brdf):
         self.lattice = lattice
         self.interpolation: Interpolation = interpolation
         self.cells_clamped = int(unusable.any(axis=-1).sum())
-        self.values: NDArray[np.float64] = lattice.extended(f_r).astype(np.float64)
+        self.values: NDArray[np.float64] = lattice.extended(f_r)
         self.source_sha256 = source_sha256 or hashlib.sha256(self.values.astype("<f8").tobytes()).hexdigest()
 
     @classmethod
@@ -61,8 +62,8 @@ class BrdfTable(Brdf):
 
     def with_interpolation(self, interpolation: Interpolation) -> BrdfTable:
         """The same cells, looked up in another way."""
-        other = object.__new__(BrdfTable)
-        other.__dict__.update(self.__dict__, interpolation=interpolation)
+        other = copy(self)
+        other.interpolation = interpolation
         return other
 
     def buffers(self) -> dict[str, NDArray[Any]]:

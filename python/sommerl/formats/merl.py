@@ -16,7 +16,10 @@ from ..files import atomic_write
 from ..lattice import Lattice
 from ..table import BrdfTable
 
-LATTICES = {(90, 90, 180): Lattice(), (90, 90, 360): Lattice(phi_d=360, reciprocal=False)}
+LATTICES: dict[tuple[int, ...], Lattice] = {
+    (90, 90, 180): Lattice(),
+    (90, 90, 360): Lattice(phi_d=360, reciprocal=False),
+}
 SCALE = np.array([1.0, 1.15, 1.66]) / 1500.0
 HEADER_BYTES = 12
 BELOW_HORIZON = -1.0  # what the stored planes hold where nothing can be measured
@@ -37,12 +40,17 @@ def read(path: Path) -> BrdfTable:
         known = " or ".join("×".join(map(str, known)) for known in LATTICES)
         raise FormatError(f"{path}: expected MERL dimensions {known}, found {'×'.join(map(str, dimensions))}")
     lattice = LATTICES[dimensions]
-    expected = HEADER_BYTES + 3 * 8 * lattice.size
+    expected = bytes_on_disk(lattice)
     if len(data) != expected:
         raise FormatError(f"{path}: expected {expected} bytes for these dimensions, found {len(data)}")
     planes = np.frombuffer(data, "<f8", offset=HEADER_BYTES).reshape(3, *lattice.shape)
     values = np.moveaxis(planes, 0, -1) * SCALE
     return BrdfTable(values, lattice, name=path.stem, source_sha256=hashlib.sha256(data).hexdigest())
+
+
+def bytes_on_disk(lattice: Lattice) -> int:
+    """The length of a MERL file with that lattice."""
+    return HEADER_BYTES + 3 * 8 * lattice.size
 
 
 def write(table: BrdfTable, path: Path) -> None:

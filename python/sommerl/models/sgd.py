@@ -1,6 +1,7 @@
-"""The Shifted Gamma Distribution model (Bagher, Soler & Holzschuch 2012, "Accurate fitting of measured reflectances using
-a Shifted Gamma micro-facet distribution", Computer Graphics Forum 31(4)): the closest analytic fit known to the materials
-of the MERL database.
+"""The Shifted Gamma Distribution model: the closest analytic fit known to the materials of the MERL database.
+
+Bagher, Soler & Holzschuch 2012, "Accurate fitting of measured reflectances using a Shifted Gamma micro-facet
+distribution", Computer Graphics Forum 31(4).
 """
 
 from __future__ import annotations

@@ -73,6 +73,10 @@ class SomManBrdf(Brdf):
         """What index and LUT take in memory."""
         return self._index.nbytes + self.lut.nbytes
 
+    def values(self) -> NDArray[np.float64]:
+        """f_r [1/sr] of each cell, of the lattice's shape + (3,)."""
+        return self.lut[self._index]
+
     def buffers(self) -> dict[str, NDArray[Any]]:
         return {"index": self._index.reshape(-1), "lut": self.lut.reshape(-1)}
 

@@ -20,7 +20,8 @@ F32 = NDArray[np.float32]
 def squared_distance(x: F32, c: F32) -> F32:
     """Squared Euclidean distance along the last axis, summed as (r² + g²) + b²."""
     d = x - c
-    return (d[..., 0] * d[..., 0] + d[..., 1] * d[..., 1]) + d[..., 2] * d[..., 2]
+    total = (d[..., 0] * d[..., 0] + d[..., 1] * d[..., 1]) + d[..., 2] * d[..., 2]
+    return np.asarray(total, np.float32)  # which it already is
 
 
 class Learner:

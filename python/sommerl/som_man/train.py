@@ -104,9 +104,7 @@ def _falloff(sigma: float) -> NDArray[np.float32]:
     return np.array(weights, np.float32)
 
 
-def _learn(
-    learner: Any, order: NDArray[np.uint32], options: TrainOptions, progress: Progress | None
-) -> list[float]:
+def _learn(learner: Any, order: NDArray[np.uint32], options: TrainOptions, progress: Progress | None) -> list[float]:
     """All epochs; the quantisation error of each."""
     chunk = max(1, COMPARISONS_A_CALL // options.clusters)
     alpha = np.float32(options.alpha)
@@ -124,9 +122,7 @@ def _learn(
     return errors
 
 
-def _lut_cells(
-    weights: NDArray[np.float32], stored: NDArray[np.uint32], x: NDArray[np.float32]
-) -> NDArray[np.uint32]:
+def _lut_cells(weights: NDArray[np.float32], stored: NDArray[np.uint32], x: NDArray[np.float32]) -> NDArray[np.uint32]:
     """The cell of each unit's stored original nearest to its weight, for units that ever won (§4.3)."""
     won = stored[:, 0] != EMPTY
     weights, stored = weights[won], stored[won]

@@ -1,0 +1,203 @@
+"""The command line: parses, calls, prints. All defaults are the library's."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, NoReturn, get_args
+
+from . import __version__, commands, demo
+from .errors import OptionError, SommerlError
+from .lattice import INTERPOLATIONS
+from .materials import NAMES
+from .render.scenes import DEFAULT_SIZE, DEFAULT_SPP
+from .som_man.options import Order, Rule, Topology, TrainOptions
+
+TRAIN_DEFAULTS = TrainOptions()
+
+DESCRIPTION = """\
+Turns measured reflectance into small material files that render fast and look like the measurement.
+
+A MATERIAL is a MERL table (.binary), a Sommerl material (.smrl), or the name of a built-in one."""
+
+BUILT_IN = "Built-in materials (SGD stand-ins for measured ones):\n  " + "\n  ".join(
+    ", ".join(NAMES[i : i + 5]) for i in range(0, len(NAMES), 5)
+)
+
+EXAMPLES = """\
+Examples:
+  sommerl demo
+  sommerl compress blue-metallic-paint.binary -o blue.smrl --clusters 256
+  sommerl info blue.smrl
+  sommerl compare blue-metallic-paint.binary blue.smrl
+  sommerl render --scene sphere blue.smrl -o blue.png
+"""
+
+
+class Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"error: {message} (see {self.prog} --help)\n")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command; returns the exit status: 0, 1 for an error in the input, 2 for one in the options."""
+    options = _parser().parse_args(arguments)
+    try:
+        result = options.run(options)
+    except OptionError as error:
+        return _fail(str(error), 2)
+    except SommerlError as error:
+        return _fail(str(error), 1)
+    except OSError as error:
+        return _fail(f"{error.filename or 'file'}: {error.strerror or error}", 1)
+    except MemoryError:
+        return _fail("not enough memory", 1)
+    except KeyboardInterrupt:
+        return _fail("interrupted; nothing was left half-written", 130)
+    if options.json:
+        print(json.dumps(_finite(result), indent=2))
+    return 0
+
+
+def _fail(message: str, status: int) -> int:
+    print(f"error: {message}", file=sys.stderr)
+    return status
+
+
+def _finite(value: Any) -> Any:
+    """The same, with null for the numbers that JSON lacks (the PSNR of identical images)."""
+    if isinstance(value, Mapping):
+        return {key: _finite(item) for key, item in value.items()}  # pyright: ignore[reportUnknownVariableType]
+    if isinstance(value, list):
+        return [_finite(item) for item in value]  # pyright: ignore[reportUnknownVariableType]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _parser() -> Parser:
+    parser = Parser(
+        prog="sommerl",
+        description=DESCRIPTION,
+        epilog=f"{BUILT_IN}\n\n{EXAMPLES}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"sommerl {__version__}")
+    add = parser.add_subparsers(metavar="COMMAND", required=True, dest="command").add_parser
+    for build in (_demo, _compress, _info, _convert, _compare, _render):
+        build(add)
+    return parser
+
+
+def _command(add: Any, name: str, run: Any, summary: str, example: str) -> Any:
+    command = add(
+        name,
+        help=summary[0].lower() + summary[1:].rstrip("."),
+        description=summary,
+        epilog=f"Example:\n  {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    command.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    command.set_defaults(run=run)
+    return command
+
+
+def _demo(add: Any) -> None:
+    summary = "Compresses a built-in material, renders reference, result and difference, and shows them on a page."
+    command = _command(add, "demo", demo.demo, summary, "sommerl demo --out demo")
+    command.add_argument(
+        "--out", type=Path, default=Path("demo"), metavar="DIR", help="folder for the files (%(default)s)"
+    )
+
+
+def _compress(add: Any) -> None:
+    summary = "Compresses materials by the paper's method (SOM-MAN) into .smrl files."
+    example = "sommerl compress nickel.binary -o nickel.smrl --clusters 1000\n  sommerl compress *.binary -o materials/"
+    command = _command(add, "compress", commands.compress, summary, example)
+    command.add_argument("inputs", nargs="+", metavar="IN", help="a material: path or built-in name")
+    command.add_argument(
+        "-o", "--output", type=Path, required=True, help="a .smrl file; for several inputs, a folder that exists"
+    )
+    command.add_argument("--preset", choices=["paper"], default="paper", help="the representation (%(default)s)")
+    helps = {
+        "clusters": "M, the number of entries in the palette",
+        "epochs": "how often the table is presented",
+        "seed": "of first weights and order",
+        "rule": "paper: Eq. 2 as printed; kohonen: without its factor x",
+        "alpha": "first learning rate, above 0, at most 1",
+        "order": "of presentation",
+        "radius": "of the neighbourhood in the first epoch, in units; 0: the winner learns alone",
+        "topology": "how the units are arranged for that",
+    }
+    allowed = {"rule": get_args(Rule), "order": get_args(Order), "topology": get_args(Topology)}
+    for field in fields(TrainOptions):
+        default = getattr(TRAIN_DEFAULTS, field.name)
+        command.add_argument(
+            f"--{field.name}",
+            type=type(default),
+            default=default,
+            choices=allowed.get(field.name),
+            metavar=None if field.name in allowed else field.name[0].upper(),
+            help=f"{helps[field.name]} (%(default)s)",
+        )
+
+
+def _info(add: Any) -> None:
+    summary = "Says what a material is: its lattice, its sizes, how it was made and how good it is."
+    command = _command(add, "info", commands.info, summary, "sommerl info nickel.smrl")
+    command.add_argument("material", metavar="MATERIAL")
+
+
+def _convert(add: Any) -> None:
+    summary = "Converts a material into the format that the output's extension names: .binary (MERL) or .smrl."
+    command = _command(add, "convert", commands.convert, summary, "sommerl convert nickel.smrl nickel.binary")
+    command.add_argument("input", metavar="IN")
+    command.add_argument("output", type=Path, metavar="OUT", help=".smrl uses the defaults of compress")
+    command.add_argument(
+        "--noise", type=int, metavar="SEED", help="add the measurement error of MERL's data to a built-in material"
+    )
+
+
+def _compare(add: Any) -> None:
+    summary = "Renders two materials on a sphere and says how far they are apart, there and cell by cell."
+    example = "sommerl compare nickel.binary nickel.smrl -o both.png"
+    command = _command(add, "compare", commands.compare, summary, example)
+    command.add_argument("reference", metavar="A")
+    command.add_argument("candidate", metavar="B")
+    command.add_argument("-o", "--output", type=Path, help="a .png with A, B and their difference (×8) side by side")
+    command.add_argument(
+        "--lookup",
+        choices=INTERPOLATIONS,
+        help="how tables are looked up; if not given: as the other material is, if that is one on the same lattice, "
+        "so that the figures measure the compression alone; else trilinear",
+    )
+    _rendering(command)
+
+
+def _render(add: Any) -> None:
+    summary = "Renders a material. PNG is exposed for the object; EXR is linear."
+    command = _command(
+        add, "render", commands.render, summary, "sommerl render --scene sphere nickel.smrl -o nickel.exr"
+    )
+    command.add_argument("material", metavar="MATERIAL")
+    command.add_argument("--scene", choices=["sphere"], default="sphere", help="(%(default)s)")
+    command.add_argument("-o", "--output", type=Path, required=True, help="a .png or .exr file")
+    command.add_argument("--lookup", choices=INTERPOLATIONS, help="how a table is looked up (trilinear)")
+    _rendering(command)
+
+
+def _rendering(command: Any) -> None:
+    for name, default, text in (
+        ("spp", DEFAULT_SPP, "samples a pixel"),
+        ("size", DEFAULT_SIZE, "width and height in pixels"),
+        ("seed", 0, "of the random numbers"),
+    ):
+        command.add_argument(f"--{name}", type=int, default=default, metavar="N", help=f"{text} (%(default)s)")
+    command.add_argument(
+        "--envmap", type=Path, metavar="FILE", help="a latitude-longitude image that lights the scene (a built-in one)"
+    )

@@ -1,0 +1,198 @@
+"""One function a command: from parsed options to an object for --json, printing on the way for people."""
+
+from __future__ import annotations
+
+import time
+from argparse import Namespace
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+from . import console
+from .brdf import Brdf
+from .describe import compression_rows, describe, image_rows, label, text, trained
+from .errors import FormatError, OptionError
+from .files import check_writable
+from .formats import merl
+from .load import load, load_table
+from .materials import NAMES, builtin_table
+from .metrics import exposure, table_metrics, to_srgb8
+from .render.compare import compare_on_sphere
+from .render.environment import default_environment, load_environment
+from .render.images import side_by_side, write_image
+from .render.llvm import mitsuba
+from .render.scenes import render as render_scene
+from .render.scenes import sphere
+from .som_man import file as smrl
+from .som_man.material import SomManBrdf
+from .som_man.options import TrainOptions
+from .table import BrdfTable
+
+LARGEST_SIZE, MOST_SPP = 8192, 2**20
+
+
+def compress(options: Namespace) -> dict[str, Any]:
+    train_options = TrainOptions(**{field.name: getattr(options, field.name) for field in fields(TrainOptions)})
+    outputs = _outputs(options.inputs, options.output)
+    results = [
+        _compress_one(load_table(source), output, train_options, options.json)
+        for source, output in zip(options.inputs, outputs, strict=True)
+    ]
+    return results[0] if len(results) == 1 else {"materials": results}
+
+
+def _outputs(inputs: list[str], output: Path) -> list[Path]:
+    """Where each input goes; said before hours are spent on training."""
+    if len(inputs) == 1 and not output.is_dir():
+        outputs = [output]
+    elif output.is_dir():
+        outputs = [output / f"{Path(source).name.removesuffix('.binary')}.smrl" for source in inputs]
+    else:
+        raise OptionError(f"{output}: expected a folder that exists, for several inputs")
+    if len(set(outputs)) < len(outputs):
+        raise OptionError("inputs: expected different names, found two that would be written to one file")
+    for path in outputs:
+        if path.suffix != ".smrl":
+            raise OptionError(f"{path}: expected a name that ends in .smrl, found {path.suffix!r}")
+        check_writable(path)
+    return outputs
+
+
+def _compress_one(table: BrdfTable, output: Path, options: TrainOptions, quiet: bool) -> dict[str, Any]:
+    material, report = trained(table, options)
+    written = smrl.save(material, output)
+    result = describe(material, written) | asdict(report) | {"epochs": options.epochs, "output": str(output)}
+    if not quiet:
+        console.print_rows(f"{material.name} → {output}", compression_rows(material, written, report))
+    return result
+
+
+def info(options: Namespace) -> dict[str, Any]:
+    brdf = load(options.material)
+    path = Path(options.material)
+    on_disk = path.stat().st_size if path.exists() else 0
+    result = describe(brdf, on_disk)
+    if not options.json:
+        shown = {key: value for key, value in result.items() if value is not None}
+        for key in ("bytes_paper", "bytes_memory", "bytes_disk"):
+            if key in shown:
+                shown[key] = console.size(shown[key])
+        console.print_rows(str(options.material), {key: text(value) for key, value in shown.items()})
+    return result
+
+
+def convert(options: Namespace) -> dict[str, Any]:
+    if options.noise is not None and (options.input not in NAMES or Path(options.input).exists()):
+        raise OptionError(f"noise: expected a built-in material, found {options.input}")
+    if options.noise is not None and options.noise < 0:
+        raise OptionError(f"noise: expected a seed of at least 0, found {options.noise}")
+    check_writable(options.output)
+    if options.output.suffix not in (".binary", ".smrl"):
+        raise OptionError(f"{options.output}: expected a name that ends in .binary or .smrl")
+    table = load_table(options.input) if options.noise is None else builtin_table(options.input, noise=options.noise)
+    if options.output.suffix == ".smrl":
+        return _compress_one(table, options.output, TrainOptions(), options.json)
+    merl.write(table, options.output)
+    written = options.output.stat().st_size
+    if not options.json:
+        print(f"{table.name} → {options.output} ({console.size(written)})")
+    return {"output": str(options.output), "bytes_disk": written}
+
+
+def compare(options: Namespace) -> dict[str, Any]:
+    if options.output:
+        _check_image(options.output, (".png",))
+    reference, candidate = _alike(load(options.reference), load(options.candidate), options.lookup)
+    environment = _environment(options)
+    with console.progress("rendering") as advance:
+        comparison = compare_on_sphere(
+            reference,
+            [candidate],
+            environment,
+            size=options.size,
+            spp=options.spp,
+            seed=options.seed,
+            progress=advance,
+        )[0]
+    if options.output:
+        write_image(options.output, side_by_side(comparison.pictures()))
+    tables = _sampled(reference, candidate)
+    metrics = table_metrics(tables[0].values, tables[1].values, tables[0].lattice)
+    result = asdict(comparison.metrics) | {f"table_{name}": value for name, value in asdict(metrics).items()}
+    result |= {"reference": label(reference), "candidate": label(candidate)}
+    if options.output:
+        result["image"] = str(options.output)
+    if not options.json:
+        rows = {"reference": result["reference"], "candidate": result["candidate"]} | image_rows(comparison.metrics)
+        rows |= {
+            "table: RMSE [1/sr]": f"{metrics.rmse:.3g}",
+            "table: log error, cosine-weighted": f"{metrics.log_error_cosine:.4f}",
+            "table: relative error": f"{metrics.relative_error:.3g}",
+        }
+        console.print_rows(f"{options.reference} against {options.candidate}", rows)
+    return result
+
+
+def render(options: Namespace) -> dict[str, Any]:
+    _check_image(options.output, (".png", ".exr"))
+    brdf = load(options.material)
+    if isinstance(brdf, BrdfTable) and options.lookup:
+        brdf = brdf.with_interpolation(options.lookup)
+    environment = _environment(options)
+    started = time.perf_counter()
+    with console.progress("rendering") as advance:
+        scene = sphere(brdf, environment, size=options.size)
+        image = render_scene(scene, spp=options.spp, seed=options.seed, progress=advance)
+    seconds = time.perf_counter() - started
+    linear = options.output.suffix == ".exr"
+    pixels = image.pixels if linear else to_srgb8(image.pixels * exposure(image.pixels, image.mask))
+    write_image(options.output, pixels)
+    if not options.json:
+        print(f"{label(brdf)} → {options.output} ({seconds:.1f} s)")
+    return {
+        "image": str(options.output),
+        "seconds": seconds,
+        "spp": options.spp,
+        "variant": mitsuba().variant(),
+        "material": label(brdf),
+    }
+
+
+def _alike(reference: Brdf, candidate: Brdf, lookup: Any) -> tuple[Brdf, Brdf]:
+    """Both as they are compared: a table is looked up as asked, or as a SOM-MAN material on its lattice is."""
+
+    def adapted(brdf: Brdf, other: Brdf) -> Brdf:
+        if not isinstance(brdf, BrdfTable):
+            return brdf
+        if lookup:
+            return brdf.with_interpolation(lookup)
+        if isinstance(other, SomManBrdf) and other.lattice == brdf.lattice:
+            return brdf.with_interpolation(other.interpolation)
+        return brdf
+
+    return adapted(reference, candidate), adapted(candidate, reference)
+
+
+def _sampled(reference: Brdf, candidate: Brdf) -> tuple[BrdfTable, BrdfTable]:
+    """Both at the cell centres of one lattice: the reference's, the candidate's or MERL's."""
+    lattices = [brdf.lattice for brdf in (reference, candidate) if isinstance(brdf, BrdfTable | SomManBrdf)]
+    first, second = (BrdfTable.sample(brdf, *lattices[:1]) for brdf in (reference, candidate))
+    return first, second
+
+
+def _check_image(path: Path, extensions: tuple[str, ...]) -> None:
+    if path.suffix not in extensions:
+        raise OptionError(f"{path}: expected a name that ends in {' or '.join(extensions)}, found {path.suffix!r}")
+    check_writable(path)
+
+
+def _environment(options: Namespace) -> Any:
+    """The environment asked for; checks the other options of rendering, too."""
+    for name, high in (("spp", MOST_SPP), ("size", LARGEST_SIZE)):
+        if not 1 <= getattr(options, name) <= high:
+            raise OptionError(f"{name}: expected 1 to {high}, found {getattr(options, name)}")
+    if not 0 <= options.seed < 2**16:
+        raise OptionError(f"seed: expected 0 to {2**16 - 1}, found {options.seed}")
+    if options.envmap and not options.envmap.is_file():
+        raise FormatError(f"{options.envmap}: expected an environment image, found no such file")
+    return load_environment(options.envmap) if options.envmap else default_environment()

@@ -1,0 +1,53 @@
+"""What the command line prints: progress, tables of values, sizes."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
+
+Advance = Callable[[int, int], None]
+
+
+@contextmanager
+def progress(what: str) -> Generator[Advance | None]:
+    """A progress bar on standard error, if that is a terminal: a function of steps done and steps in all."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %")
+    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=None)
+
+        def advance(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+
+        yield advance
+
+
+def print_rows(title: str, rows: Mapping[str, str]) -> None:
+    """A table of names and values on standard output."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title, show_header=False, title_justify="left")
+    table.add_column()
+    table.add_column(justify="right", overflow="fold")
+    for name, value in rows.items():
+        table.add_row(name, value)
+    Console(soft_wrap=False).print(table, markup=False)
+
+
+def size(count: int) -> str:
+    """A number of bytes, in the units of 1000 that file sizes are given in."""
+    if count < 1000:
+        return f"{count} B"
+    return f"{count / 1e3:.1f} kB" if count < 1e6 else f"{count / 1e6:.2f} MB"
+
+
+def decibels(value: float) -> str:
+    """A PSNR; identical images have none."""
+    return "identical" if value == float("inf") else f"{value:.2f} dB"

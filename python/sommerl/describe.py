@@ -1,0 +1,86 @@
+"""Materials and results as the rows and keys that the command line shows."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from . import console
+from .brdf import Brdf
+from .metrics import ImageMetrics, table_metrics
+from .som_man.material import SomManBrdf
+from .som_man.options import TrainOptions
+from .som_man.train import TrainReport, train
+from .table import BrdfTable
+
+METRICS_DIGITS = 6  # so that the file does not hold the last bits of a machine's sums
+
+
+def trained(table: BrdfTable, options: TrainOptions) -> tuple[SomManBrdf, TrainReport]:
+    """Trains under a progress bar, and measures the result."""
+    with console.progress(f"training {table.name}") as advance:
+        material, report = train(table, options, progress=advance)
+    metrics = table_metrics(table.values, material.values(), table.lattice)
+    measured = asdict(metrics) | {"quantisation_error": report.quantisation_error[-1]}
+    material.metrics = {name: float(f"{value:.{METRICS_DIGITS}g}") for name, value in measured.items()}
+    return material, report
+
+
+def describe(brdf: Brdf, bytes_disk: int | None) -> dict[str, Any]:
+    """What `info` says of a material; null where a kind of material has no such thing."""
+    known: dict[str, Any] = dict.fromkeys(("clusters", "lattice", "interpolation", "domain", "bytes_paper"))
+    known |= dict.fromkeys(("bytes_memory", "options", "metrics", "source_sha256", "cells_clamped"))
+    kind = "model"
+    if isinstance(brdf, SomManBrdf):
+        kind = "som-man"
+        known |= {"clusters": brdf.clusters, "domain": "linear", "bytes_paper": brdf.bytes_paper}
+        known |= {"bytes_memory": brdf.bytes_memory, "options": brdf.options, "metrics": brdf.metrics}
+    if isinstance(brdf, BrdfTable):
+        kind = "table"
+        known |= {"domain": "linear", "bytes_memory": brdf.values.nbytes, "cells_clamped": brdf.cells_clamped}
+    if isinstance(brdf, SomManBrdf | BrdfTable):
+        known |= {"lattice": list(brdf.lattice.shape), "interpolation": brdf.interpolation}
+        known["source_sha256"] = brdf.source_sha256
+    return {"kind": kind, "name": brdf.name, **known, "bytes_disk": bytes_disk}
+
+
+def label(brdf: Brdf) -> str:
+    """A material's name, and how it is looked up."""
+    return f"{brdf.name} ({getattr(brdf, 'interpolation', 'formula')})"
+
+
+def text(value: Any) -> str:
+    """A value of `describe` for people."""
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {item}" for key, item in value.items())  # pyright: ignore
+    return " × ".join(map(str, value)) if isinstance(value, list) else str(value)  # pyright: ignore
+
+
+def compression_rows(material: SomManBrdf, bytes_disk: int, report: TrainReport) -> dict[str, str]:
+    """What was reached, and at which size."""
+    dropped = f" ({report.units_dropped} units dropped)" if report.units_dropped else ""
+    rows = {
+        "clusters": f"{material.clusters}{dropped}",
+        "epochs": str(len(report.quantisation_error)),
+        "quantisation error, last epoch": f"{report.quantisation_error[-1]:.3g}",
+        "table: RMSE [1/sr]": f"{material.metrics['rmse']:.3g}",
+        "table: log error, cosine-weighted": f"{material.metrics['log_error_cosine']:.4f}",
+        "table: relative error": f"{material.metrics['relative_error']:.3g}",
+        "size as the paper counts it": console.size(material.bytes_paper),
+        "size in memory": console.size(material.bytes_memory),
+        "size on disk": console.size(bytes_disk),
+    }
+    if report.cells_clamped:
+        rows["cells clamped to 0"] = str(report.cells_clamped)
+    return rows | {"training": f"{report.seconds:.1f} s"}
+
+
+def image_rows(metrics: ImageMetrics) -> dict[str, str]:
+    """Distances between two renderings."""
+    return {
+        "PSNR, object": console.decibels(metrics.psnr_object_db),
+        "PSNR, frame": console.decibels(metrics.psnr_frame_db),
+        "SSIM": f"{metrics.ssim:.4f}",
+        "ΔE_ITP": f"{metrics.delta_e_itp:.2f}",
+        "FLIP": f"{metrics.flip:.4f}",
+    }
