@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import FormatError
 from .llvm import mitsuba
 
-# Elevation [degrees], azimuth [degrees, 0 behind the camera, growing to its right], angular size σ [degrees], radiance.
+# Elevation [degrees], azimuth [degrees, 0 behind the camera, growing to its left], angular size σ [degrees], radiance.
 LIGHTS = (
     (35.0, -75.0, 18.0, (2.6, 2.4, 2.1)),
     (55.0, 40.0, 7.0, (14.0, 13.0, 12.0)),

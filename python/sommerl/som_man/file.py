@@ -81,7 +81,9 @@ def decode(data: bytes) -> SomManBrdf:
     try:
         header: dict[str, Any] = json.loads(data[PREFIX.size : PREFIX.size + header_bytes])
         return _material(header, data[PREFIX.size + header_bytes :])
-    except (KeyError, TypeError, ValueError, AttributeError, lzma.LZMAError) as error:
+    except FormatError:
+        raise
+    except (KeyError, TypeError, ValueError, RecursionError, lzma.LZMAError, SommerlError) as error:
         raise FormatError(f"expected a material file's header and contents, found others ({error})") from error
 
 
@@ -102,6 +104,8 @@ def _material(header: dict[str, Any], compressed: bytes) -> SomManBrdf:
     sides = (*lattice.shape, clusters)
     if not all(type(n) is int and n >= 1 for n in sides) or lattice.size > MOST_CELLS or clusters > 2**16:
         raise FormatError(f"expected a lattice of at most {MOST_CELLS} cells and a LUT of at most 65536 entries")
+    if type(lattice.reciprocal) is not bool:
+        raise FormatError(f"expected a lattice that is reciprocal or not, found {lattice.reciprocal}")
     if interpolation not in INTERPOLATIONS:
         raise FormatError(f"expected interpolation {' or '.join(INTERPOLATIONS)}, found {interpolation}")
     above = lattice.above_horizon

@@ -33,8 +33,8 @@ class TrainOptions:
     clusters: int = 256
     epochs: int = 30
     seed: int = 0
-    rule: Rule = "paper"
-    alpha: float = 0.5
+    rule: Rule = "kohonen"
+    alpha: float = 0.02
     order: Order = "seeded"
     radius: float = 0.0
     topology: Topology = "chain"

@@ -1,0 +1,159 @@
+import numpy as np
+import pytest
+from conftest import SMALL, lambertian_table, must_fail
+
+from sommerl import BrdfTable, TrainOptions, load, save, train
+from sommerl.errors import FormatError
+from sommerl.render.compare import compare_on_sphere
+from sommerl.render.environment import LIGHTS, default_environment, load_environment
+from sommerl.render.images import difference, encode, side_by_side, write_image, write_page
+from sommerl.render.llvm import mitsuba
+from sommerl.render.scenes import FILL, render, sphere
+
+WHITE = np.ones((16, 32, 3), np.float32)
+mi = mitsuba()
+
+
+def interior(mask):
+    """Pixels that show nothing but the object."""
+    return np.logical_and.reduce([np.roll(mask, shift, (0, 1)) for shift in ((1, 0), (-1, 0), (0, 1), (0, -1))])
+
+
+def check_albedo(brdf, albedo):
+    """In a uniformly white environment, a Lambertian sphere has the radiance ρ everywhere."""
+    image = render(sphere(brdf, WHITE, size=48), spp=64)
+    pixels = image.pixels[interior(image.mask)]
+    assert pixels.mean() == pytest.approx(albedo, rel=5e-3)
+    assert np.abs(pixels / albedo - 1).max() < 0.3
+
+
+def test_a_lambertian_table_comes_back_as_its_albedo_through_the_whole_chain(tmp_path):
+    material, _ = train(lambertian_table(0.45), TrainOptions(clusters=1, epochs=1))
+    save(material, tmp_path / "grey.smrl")
+    check_albedo(load(tmp_path / "grey.smrl"), 0.45)
+    must_fail(check_albedo, load(tmp_path / "grey.smrl"), 0.47)
+
+
+def test_same_seed_same_pixels_another_seed_others(small_table):
+    environment = default_environment(32)
+
+    def pixels(seed):
+        return render(sphere(small_table, environment, size=16), spp=8, seed=seed).pixels
+
+    assert np.array_equal(pixels(3), pixels(3))
+    assert not np.array_equal(pixels(3), pixels(4))
+
+
+def test_passes_add_up_and_are_reported(small_table, monkeypatch):
+    scene = sphere(small_table, default_environment(32), size=16)
+    whole = render(scene, spp=64)
+    monkeypatch.setattr("sommerl.render.scenes.SAMPLES_A_PASS", 16 * 16 * 24)
+    steps = []
+    parts = render(scene, spp=64, progress=lambda *step: steps.append(step))
+    assert steps == [(1, 3), (2, 3), (3, 3)]
+    assert not np.array_equal(parts.pixels, whole.pixels)
+    assert parts.pixels[parts.mask].mean() == pytest.approx(whole.pixels[whole.mask].mean(), rel=0.05)
+
+
+def test_mask_is_the_disc():
+    mask = render(sphere(lambertian_table(), WHITE, size=64), spp=1).mask
+    y, x = np.mgrid[:64, :64] + 0.5
+    disc = np.hypot(x - 32, y - 32) < FILL * 32
+    assert (mask != disc).mean() < 0.005
+
+
+def test_comparison_measures_the_representation_and_not_the_noise(small_table):
+    found = compare_on_sphere(small_table, [small_table], default_environment(32), size=24, spp=4)[0]
+    assert found.metrics.psnr_frame_db == np.inf
+    assert (found.pictures()[2] == 0).all()
+
+
+def test_comparison_of_several_candidates_in_order():
+    grey, darker, darkest = lambertian_table(0.5), lambertian_table(0.45), lambertian_table(0.3)
+    steps = []
+    found = compare_on_sphere(grey, [darker, darkest], WHITE, size=24, spp=4, progress=lambda *s: steps.append(s))
+    assert found[0].metrics.psnr_object_db > found[1].metrics.psnr_object_db
+    assert steps == [(1, 3), (2, 3), (3, 3)]
+
+
+def test_the_environment_stands_as_documented():
+    """Its upper rows are above, its middle column is behind the camera, and what lies right of that is to the left."""
+
+    def lit(rows, columns):
+        environment = np.full((64, 128, 3), 1e-4, np.float32)
+        environment[rows, columns] = 1
+        image = render(sphere(lambertian_table(), environment, size=32), spp=64)
+        return image.pixels[..., 0], interior(image.mask)
+
+    pixels, inside = lit(slice(None), slice(60, 68))
+    assert pixels[inside].mean() > 0.02  # the camera sees the lit side …
+    assert pixels[0, 0] == pixels[-1, -1] == pytest.approx(1e-4)  # … and not the light
+    pixels, _ = lit(slice(8), slice(None))
+    assert pixels[6:14, 12:20].mean() > 2 * pixels[18:26, 12:20].mean()
+    pixels, _ = lit(slice(24, 40), slice(90, 102))
+    assert pixels[12:20, 4:12].mean() > 2 * pixels[12:20, 20:28].mean()
+
+
+def test_the_default_environment_has_what_a_material_needs_to_show():
+    radiance = default_environment()
+    assert radiance.shape == (512, 1024, 3)
+    assert np.isfinite(radiance).all()
+    assert (radiance > 0).all()
+    sizes = [sigma for _, _, sigma, _ in LIGHTS]
+    assert len(LIGHTS) >= 4
+    assert max(sizes) > 15
+    assert min(sizes) < 1
+    assert radiance.max() / np.median(radiance) > 1000
+
+
+def test_environment_from_a_file(tmp_path):
+    radiance = default_environment(16)
+    write_image(tmp_path / "probe.exr", radiance)
+    assert np.allclose(load_environment(tmp_path / "probe.exr"), radiance, rtol=1e-3)
+    write_image(tmp_path / "dark.exr", 0 * radiance)
+    with pytest.raises(FormatError, match="only black"):
+        load_environment(tmp_path / "dark.exr")
+    (tmp_path / "text.exr").write_text("no image")
+    with pytest.raises(FormatError, match="expected an environment image, found something unreadable"):
+        load_environment(tmp_path / "text.exr")
+
+
+def test_images_are_written_and_read_back(tmp_path):
+    rng = np.random.default_rng(0)
+    bytes8 = rng.integers(0, 256, (5, 7, 3), np.uint8)
+    write_image(tmp_path / "a.png", bytes8)
+    assert np.array_equal(np.array(mi.Bitmap(str(tmp_path / "a.png"))), bytes8)
+    linear = rng.random((5, 7, 3)).astype(np.float32)
+    write_image(tmp_path / "a.exr", linear)
+    assert np.array_equal(np.array(mi.Bitmap(str(tmp_path / "a.exr"))), linear)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.exr", "a.png"]
+
+
+def test_difference_is_absolute_and_eightfold():
+    a, b = np.array([[[10, 10, 200]]], np.uint8), np.array([[[13, 8, 0]]], np.uint8)
+    assert difference(a, b).tolist() == difference(b, a).tolist() == [[[24, 16, 255]]]
+    assert side_by_side([a, b]).shape == (1, 2, 3)
+
+
+def test_page_holds_its_pictures_and_escapes_its_text(tmp_path):
+    picture = np.zeros((2, 2, 3), np.uint8)
+    path = tmp_path / "index.html"
+    write_page(path, "<b> & co", [("one", picture), ("two", picture)], {"PSNR": "50 dB"}, "a < b")
+    page = path.read_text()
+    assert page.count("data:image/png;base64,") == 2
+    assert "&lt;b&gt; &amp; co" in page
+    assert "<td>50 dB</td>" in page
+    assert encode(picture).startswith(b"\x89PNG")
+
+
+def test_a_material_with_one_entry_and_one_with_sixteen_bit_indices_render(small_table):
+    for clusters in (1, 300):
+        material, _ = train(small_table, TrainOptions(clusters=clusters, epochs=1, alpha=0.001))
+        assert np.isfinite(render(sphere(material, WHITE, size=8), spp=4).pixels).all()
+
+
+def test_black_material_renders_black():
+    values = np.zeros((*SMALL.shape, 3))
+    values[0, 0, 0] = 1e-30
+    image = render(sphere(BrdfTable(values, SMALL), WHITE, size=16), spp=4)
+    assert image.pixels[interior(image.mask)].max() == 0

@@ -1,0 +1,26 @@
+import pytest
+
+from sommerl.files import atomic_write, check_writable
+
+
+def test_a_file_appears_whole_or_not_at_all(tmp_path):
+    path = tmp_path / "out"
+    path.write_bytes(b"before")
+    with pytest.raises(KeyboardInterrupt), atomic_write(path) as out:
+        out.write(b"half")
+        raise KeyboardInterrupt
+    assert path.read_bytes() == b"before"
+    assert list(tmp_path.iterdir()) == [path]
+    with atomic_write(path) as out:
+        out.write(b"after")
+    assert path.read_bytes() == b"after"
+    assert path.stat().st_mode & 0o444 == 0o444
+
+
+def test_what_cannot_be_written_is_said_beforehand(tmp_path):
+    check_writable(tmp_path / "new")
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(OSError, match="found a directory"):
+        check_writable(tmp_path)
+    with pytest.raises(OSError, match="no folder"):
+        check_writable(tmp_path / "none" / "out")

@@ -1,0 +1,116 @@
+import numpy as np
+import pytest
+from conftest import lambertian_table, must_fail, random_directions
+
+from sommerl import NAMES, builtin
+from sommerl.arrays import split
+from sommerl.sampling import BlinnPhongSampler
+
+ANGLES = (0, 45, 80)
+SHARP = BlinnPhongSampler(50.0, 0.7)
+
+
+def viewer(degrees):
+    theta = np.radians(degrees)
+    return np.array([np.sin(theta), 0.0, np.cos(theta)])
+
+
+def hemisphere(n=1200):
+    """Directions on a grid over the hemisphere, and their solid angles."""
+    theta, phi = np.meshgrid((np.arange(n) + 0.5) / n * np.pi / 2, (np.arange(n) + 0.5) / n * 2 * np.pi, indexing="ij")
+    wi = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1).reshape(-1, 3)
+    return wi, (np.sin(theta) * np.pi / 2 / n * 2 * np.pi / n).reshape(-1)
+
+
+def drawn(sampler, wo, count=400_000, seed=0):
+    u = np.random.default_rng(seed).random((3, count))
+    wi, pdf = sampler.sample(tuple(np.full(count, c) for c in wo), tuple(u))
+    return np.stack(wi, -1), pdf
+
+
+def check_density(sampler, wo):
+    """The share of samples above the horizon, and their mean direction, are what the density says."""
+    grid, solid_angle = hemisphere()
+    density = sampler.pdf(split(grid), split(np.broadcast_to(wo, grid.shape))) * solid_angle
+    wi, pdf = drawn(sampler, wo)
+    kept = pdf > 0
+    error = 4 / np.sqrt(len(wi))
+    assert density.sum() == pytest.approx(kept.mean(), abs=error)
+    for axis in range(3):
+        assert (density * grid[:, axis]).sum() == pytest.approx((wi[:, axis] * kept).mean(), abs=error)
+
+
+@pytest.mark.parametrize("degrees", ANGLES)
+@pytest.mark.parametrize("sampler", [SHARP, BlinnPhongSampler(1.0, 0.5), BlinnPhongSampler(2000.0, 0.9)])
+def test_density_is_that_of_the_samples(sampler, degrees):
+    check_density(sampler, viewer(degrees))
+
+
+def test_that_check_notices_a_forgotten_jacobian_and_another_lobe():
+    class Forgotten(BlinnPhongSampler):
+        def pdf(self, wi, wo):
+            h = np.stack(wi, -1) + np.stack(wo, -1)
+            h /= np.linalg.norm(h, axis=-1, keepdims=True)
+            cos_d = (h * np.stack(wo, -1)).sum(-1)
+            return super().pdf(wi, wo) * 4 * cos_d
+
+    class Other(BlinnPhongSampler):
+        def pdf(self, wi, wo):
+            return BlinnPhongSampler(40.0, 0.7).pdf(wi, wo)
+
+    must_fail(check_density, Forgotten(50.0, 0.7), viewer(45))
+    must_fail(check_density, Other(50.0, 0.7), viewer(45))
+
+
+def check_albedo(brdf, sampler, wo):
+    """The mean weight of samples is the albedo, within three standard errors."""
+    grid, solid_angle = hemisphere()
+    albedo = (brdf.eval(grid, wo).mean(-1) * grid[:, 2] * solid_angle).sum()
+    wi, pdf = drawn(sampler, wo)
+    kept = pdf > 0
+    weight = np.zeros(len(wi))
+    weight[kept] = brdf.eval(wi[kept], wo).mean(-1) * wi[kept, 2] / pdf[kept]
+    assert abs(weight.mean() - albedo) < 3 * weight.std() / np.sqrt(len(wi))
+
+
+@pytest.mark.parametrize("degrees", ANGLES)
+@pytest.mark.parametrize("name", ["blue-metallic-paint", "nickel", "beige-fabric"])
+def test_mean_weight_is_the_albedo(name, degrees):
+    brdf = builtin(name)
+    check_albedo(brdf, BlinnPhongSampler.fitted(brdf), viewer(degrees))
+
+
+def test_that_check_notices_a_brighter_material():
+    class Brighter:
+        def eval(self, wi, wo):
+            return builtin("nickel").eval(wi, wo) * (1.05 if len(wi) > 1_000_000 else 1)
+
+    must_fail(check_albedo, Brighter(), BlinnPhongSampler.fitted(builtin("nickel")), viewer(0))
+
+
+def test_lambertian_weights_are_the_albedo_itself():
+    cosine = BlinnPhongSampler(10.0, 0.0)
+    wi, pdf = drawn(cosine, viewer(30), 1000)
+    assert np.allclose(lambertian_table(0.7).eval(wi, viewer(30))[:, 0] * wi[:, 2] / pdf, 0.7)
+
+
+def test_no_direction_that_reflects_is_left_out():
+    for name in NAMES:
+        sampler = BlinnPhongSampler.fitted(builtin(name))
+        wi, wo = random_directions(2000, 1), random_directions(2000, 2)
+        assert (sampler.pdf(split(wi), split(wo)) > 0).all()
+
+
+def test_shinier_materials_get_sharper_lobes():
+    exponents = [
+        BlinnPhongSampler.fitted(builtin(name)).exponent for name in ("beige-fabric", "blue-metallic-paint", "nickel", "chrome")
+    ]
+    assert exponents == sorted(exponents)
+    assert exponents[0] < 10 < 100 < exponents[2]
+
+
+def test_nothing_below_the_horizon():
+    wo = split(np.array([[0.0, 0.6, 0.8], [0.0, 0.6, -0.8], [0.0, 0.6, 0.8]]))
+    wi = split(np.array([[0.0, 0.6, -0.8], [0.0, 0.6, 0.8], [0.0, -0.6, 0.8]]))
+    pdf = SHARP.pdf(wi, wo)
+    assert pdf[0] == pdf[1] == 0 < pdf[2]
