@@ -6,9 +6,14 @@ from sommerl.files import atomic_write, check_writable
 def test_a_file_appears_whole_or_not_at_all(tmp_path):
     path = tmp_path / "out"
     path.write_bytes(b"before")
-    with pytest.raises(KeyboardInterrupt), atomic_write(path) as out:
-        out.write(b"half")
-        raise KeyboardInterrupt
+
+    def write_half():
+        with atomic_write(path) as out:
+            out.write(b"half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_half()
     assert path.read_bytes() == b"before"
     assert list(tmp_path.iterdir()) == [path]
     with atomic_write(path) as out:

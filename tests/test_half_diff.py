@@ -79,9 +79,12 @@ def test_swapping_adds_pi_when_not_folded():
 def test_ranges_and_the_pole():
     wi, wo = random_directions(10_000, 7), random_directions(10_000, 8)
     theta_h, theta_d, phi_d = half_diff(split(wi), split(wo))
-    assert theta_h.min() >= 0 and theta_h.max() <= np.pi / 2
-    assert theta_d.min() >= 0 and theta_d.max() <= np.pi / 2
-    assert phi_d.min() >= 0 and phi_d.max() <= np.pi
+    assert theta_h.min() >= 0
+    assert theta_h.max() <= np.pi / 2
+    assert theta_d.min() >= 0
+    assert theta_d.max() <= np.pi / 2
+    assert phi_d.min() >= 0
+    assert phi_d.max() <= np.pi
     up = np.array([[0.0, 0.0, 1.0]])
     assert [float(angle[0]) for angle in half_diff(split(up), split(up))] == [0, 0, 0]
 

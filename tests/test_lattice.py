@@ -67,8 +67,8 @@ def by_rotation_and_arccosine(wi, wo):
 def test_share_of_cells_ever_hit_from_integer_degrees():
     """Fig. 2: 90 × 180 × 90 × 180 direction pairs, of which only φ_in - φ_out matters.
 
-    Many of them lie exactly on the edges of bins, where the rounding of rotations and arccosines decides: it spreads them
-    over 28.4 % of the cells. Without that noise it is 28.1 %.
+    Many of them lie exactly on the edges of bins, where the rounding of rotations and arccosines decides: it spreads
+    them over 28.4 % of the cells. Without that noise it is 28.1 %.
     """
     theta, phi = np.radians(np.arange(90)), np.radians(np.arange(0, 360, 2))
     theta_i, theta_o, phi = np.meshgrid(theta, theta, phi, indexing="ij")
@@ -92,8 +92,10 @@ def test_weights_add_up_to_1_and_stay_within(lattice):
     assert len(corners) == 8
     assert np.allclose(sum(weight for _, weight in corners), 1)
     for cell, weight in corners:
-        assert cell.min() >= 0 and cell.max() < lattice.size
-        assert weight.min() >= 0 and weight.max() <= 1
+        assert cell.min() >= 0
+        assert cell.max() < lattice.size
+        assert weight.min() >= 0
+        assert weight.max() <= 1
 
 
 def check_interpolation(corners_of):
@@ -103,7 +105,9 @@ def check_interpolation(corners_of):
     angles = (u / 8) ** 2 * np.pi / 2, v / 8 * np.pi / 2, w / 12 * np.pi
     assert np.allclose(interpolated(corners_of(*angles), 3 * h - 2 * d + p), 3 * u - 2 * v + w)
     seam = np.array([0.0, np.pi / 24, np.pi * (1 - 1e-9)])  # halfway between, on the first centre, halfway again
-    wave = interpolated(corners_of(0 * seam + 0.3, 0 * seam + 0.3, seam), np.where(p < 1, 1.0, np.where(p > 11, 3.0, 0)))
+    wave = interpolated(
+        corners_of(0 * seam + 0.3, 0 * seam + 0.3, seam), np.where(p < 1, 1.0, np.where(p > 11, 3.0, 0))
+    )
     assert np.allclose(wave, [2, 1, 2], atol=1e-6)
 
 

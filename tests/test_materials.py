@@ -83,7 +83,7 @@ def test_noise():
 
 
 def test_unknown_names_suggest_the_nearest():
-    with pytest.raises(MaterialError, match="blue-metalic-paint: .*did you mean blue-metallic-paint"):
+    with pytest.raises(MaterialError, match=r"blue-metalic-paint: .*did you mean blue-metallic-paint"):
         load("blue-metalic-paint")
     with pytest.raises(MaterialError, match="did you mean"):
         load("?!")

@@ -103,7 +103,8 @@ def test_no_direction_that_reflects_is_left_out():
 
 def test_shinier_materials_get_sharper_lobes():
     exponents = [
-        BlinnPhongSampler.fitted(builtin(name)).exponent for name in ("beige-fabric", "blue-metallic-paint", "nickel", "chrome")
+        BlinnPhongSampler.fitted(builtin(name)).exponent
+        for name in ("beige-fabric", "blue-metallic-paint", "nickel", "chrome")
     ]
     assert exponents == sorted(exponents)
     assert exponents[0] < 10 < 100 < exponents[2]

@@ -11,7 +11,9 @@ def test_the_one_in_use_is_new_enough():
     assert llvm.llvm_version(path) >= 17
 
 
-@pytest.mark.parametrize(("versions", "chosen"), [((14, 16, 19), 2), ((0, 21, 17), 1), ((16, 15, 14), None), ((), None)])
+@pytest.mark.parametrize(
+    ("versions", "chosen"), [((14, 16, 19), 2), ((0, 21, 17), 1), ((16, 15, 14), None), ((), None)]
+)
 def test_old_ones_are_passed_over(monkeypatch, versions, chosen):
     paths = {f"libLLVM-{i}.so": version for i, version in enumerate(versions)}
     monkeypatch.setattr(llvm, "_candidates", lambda: iter(paths))

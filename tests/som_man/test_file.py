@@ -128,7 +128,9 @@ def test_hostile_headers_are_refused_before_anything_is_allocated(material, chan
         decode(sealed(header | change, payload))
 
 
-@pytest.mark.parametrize("header", [b"", b"[]", b"null", b"{", b"\xff\xfe", b"{}", b'{"lattice": 1e999}', b"[" * 100000])
+@pytest.mark.parametrize(
+    "header", [b"", b"[]", b"null", b"{", b"\xff\xfe", b"{}", b'{"lattice": 1e999}', b"[" * 100000]
+)
 def test_headers_that_are_none_are_refused(header):
     with pytest.raises(FormatError):
         decode(sealed(header, b""))
