@@ -42,7 +42,7 @@ class BlinnPhongSampler:
         exponent = min(SHARPEST, max(1.0, math.log(0.5) / math.log(math.cos(max(half, 1e-3))) - 1))
         # A half vector's solid angle maps to one about four times as large around the light's direction.
         lobe = 4 * PI * light.sum()
-        return cls(exponent, min(0.9, max(0.1, lobe / (lobe + PI * base + 1e-9))))
+        return cls(exponent, min(0.9, max(0.1, float(lobe / (lobe + PI * base + 1e-9)))))
 
     def sample(self, wo: Triple, u: Triple) -> tuple[Triple, Array]:
         """A direction wi for uniform random numbers u in [0, 1)³, and its density [1/sr].
