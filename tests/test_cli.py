@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import must_fail
+from helpers import must_fail
 
 from sommerl import NAMES, load
 from sommerl.cli import main

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from conftest import must_fail, random_directions
+from helpers import must_fail, random_directions
 
 from sommerl.arrays import split
 from sommerl.half_diff import directions, half_diff

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from conftest import SMALL, must_fail, random_directions
+from helpers import SMALL, must_fail, random_directions
 
 from sommerl import MERL, Lattice
 from sommerl.arrays import split

@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import SMALL, must_fail, random_directions
+from helpers import SMALL, must_fail, random_directions
 
 from sommerl import MERL, NAMES, BrdfTable, builtin, builtin_table, load
 from sommerl.arrays import split

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from conftest import SMALL, must_fail
+from helpers import SMALL, must_fail
 
 from sommerl import metrics
 from sommerl.errors import MaterialError

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from conftest import lambertian_table, must_fail, random_directions
+from helpers import lambertian_table, must_fail, random_directions
 
 from sommerl import NAMES, builtin
 from sommerl.arrays import split

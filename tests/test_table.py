@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from conftest import SMALL, lambertian_table, must_fail, random_directions
+from helpers import SMALL, lambertian_table, must_fail, random_directions
 
 from sommerl import BrdfTable
 from sommerl.errors import MaterialError

@@ -4,7 +4,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import must_fail, random_directions
+from helpers import must_fail, random_directions
 
 from sommerl import BrdfTable, Lattice, TrainOptions, builtin, save, train
 from sommerl.arrays import Packed16, gather3, ops

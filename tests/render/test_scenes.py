@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from conftest import SMALL, lambertian_table, must_fail
+from helpers import SMALL, lambertian_table, must_fail
 
 from sommerl import BrdfTable, TrainOptions, load, save, train
 from sommerl.errors import FormatError

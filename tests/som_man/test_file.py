@@ -5,7 +5,7 @@ import zlib
 
 import numpy as np
 import pytest
-from conftest import SMALL, must_fail
+from helpers import SMALL, must_fail
 
 from sommerl import SommerlError, TrainOptions, load, save, train
 from sommerl.errors import FormatError

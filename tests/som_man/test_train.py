@@ -2,7 +2,7 @@ import itertools
 
 import numpy as np
 import pytest
-from conftest import SMALL, must_fail
+from helpers import SMALL, must_fail
 
 from sommerl import BrdfTable, TrainOptions, _core, train
 from sommerl.errors import MaterialError, OptionError

@@ -1,0 +1,31 @@
+"""Small tables that many tests share, and what runs checks that must be able to fail."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from sommerl import BrdfTable, Lattice
+
+SMALL = Lattice(8, 8, 12)
+
+
+def must_fail(check: Callable[..., Any], *broken: Any) -> None:
+    """Runs a check on something broken on purpose: the check has to notice."""
+    with pytest.raises(AssertionError):
+        check(*broken)
+
+
+def random_directions(count: int, seed: int = 0) -> NDArray[np.float64]:
+    """Unit vectors above the horizon, uniform over the hemisphere."""
+    v = np.random.default_rng(seed).standard_normal((count, 3))
+    v /= np.linalg.norm(v, axis=-1, keepdims=True)
+    v[:, 2] = np.abs(v[:, 2])
+    return v
+
+
+def lambertian_table(albedo: float = 0.5, lattice: Lattice = SMALL) -> BrdfTable:
+    values = np.full((*lattice.shape, 3), albedo / np.pi)
+    return BrdfTable(values, lattice, name="lambertian")
