@@ -1,4 +1,4 @@
-"""Which rule and first learning rate? PSNR on the sphere for the paper's cases, and file sizes at M = 256.
+"""Which rule and first learning rate? PSNR on the sphere in the paper's cases; quality and size with the defaults.
 
     uv run python benchmarks/learner_options.py FOLDER                       the defaults
     uv run python benchmarks/learner_options.py FOLDER --grid                every rule and rate
@@ -12,10 +12,10 @@ from __future__ import annotations
 import argparse
 import statistics
 from pathlib import Path
-
-import numpy as np
+from typing import Any
 
 from sommerl import TrainOptions, load_table, train
+from sommerl.metrics import ImageMetrics
 from sommerl.render.compare import compare_on_sphere
 from sommerl.render.environment import default_environment, load_environment
 from sommerl.som_man.file import encode
@@ -34,6 +34,13 @@ MATERIALS = tuple(dict.fromkeys(case[0] for case in CASES))
 GRID = [(rule, alpha) for rule in ("paper", "kohonen") for alpha in (0.5, 0.1, 0.02, 0.004)]
 
 
+def measured(path: Path, environment: Any, spp: int, **options: Any) -> tuple[ImageMetrics, int]:
+    """How far a material is from its table, and the bytes of its file."""
+    table = load_table(path).with_interpolation("nearest")
+    material, _ = train(table, TrainOptions(**options))
+    return compare_on_sphere(table, [material], environment, spp=spp)[0].metrics, len(encode(material))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
@@ -50,19 +57,19 @@ def main() -> None:
         for seed in options.seeds:
             row: list[str] = []
             for name, clusters, epochs, over in CASES:
-                table = load_table(options.folder / f"{name}.binary").with_interpolation("nearest")
-                chosen = TrainOptions(clusters=clusters, epochs=epochs, rule=rule, alpha=alpha, seed=seed)
-                material, _ = train(table, chosen)
-                metrics = compare_on_sphere(table, [material], environment, spp=options.spp)[0].metrics
+                chosen = {"clusters": clusters, "epochs": epochs, "rule": rule, "alpha": alpha, "seed": seed}
+                metrics, _ = measured(options.folder / f"{name}.binary", environment, options.spp, **chosen)
                 row.append(f"{metrics.psnr_frame_db if over == 'frame' else metrics.psnr_object_db:.1f}")
             print(f"| {rule} | {alpha} | {seed} | " + " | ".join(row) + " |", flush=True)
-    print("\nFile size [bytes] at M = 256, 30 epochs, with the defaults:\n\n| material | bytes |\n|---|---|")
-    sizes = [len(encode(train(load_table(options.folder / f"{name}.binary"))[0])) for name in MATERIALS]
-    for name, size in zip(MATERIALS, sizes, strict=True):
-        print(f"| {name} | {size} |")
-    print(f"| median | {statistics.median(sizes):.0f} |")
+    print(f"\nThe defaults: M = {default.clusters}, {default.epochs} epochs\n")
+    print("| material | PSNR object [dB] | PSNR frame [dB] | file [bytes] |\n|---|---|---|---|")
+    sizes: list[int] = []
+    for name in MATERIALS:
+        metrics, size = measured(options.folder / f"{name}.binary", environment, options.spp)
+        print(f"| {name} | {metrics.psnr_object_db:.1f} | {metrics.psnr_frame_db:.1f} | {size} |", flush=True)
+        sizes.append(size)
+    print(f"| median | | | {statistics.median(sizes):.0f} |")
 
 
 if __name__ == "__main__":
-    np.seterr(all="raise", under="ignore")
     main()

@@ -4,12 +4,13 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers import must_fail
 
-from sommerl import NAMES, load
+from sommerl import NAMES, BrdfTable, Lattice, load
 from sommerl.cli import main
 from sommerl.formats import merl
 from sommerl.load import load_table
@@ -248,7 +249,7 @@ def test_bad_files_are_refused_by_every_command(capsys, tmp_path, command, name)
         (["convert", "{}/none.binary", "{}/x.binary", "--noise", "1"], 2, "noise: expected a built-in material"),
         (["convert", "nickel", "{}/x.binary", "--noise", "-1"], 2, "noise: expected a seed"),
         (["compare", "nickel", "chrome", "--spp", "0"], 2, "spp: expected 1 to"),
-        (["compare", "nickel", "chrome", "--size", "0"], 2, "size: expected 1 to"),
+        (["compare", "nickel", "chrome", "--size", "0"], 2, "size: expected 8 to"),
         (["compare", "nickel", "chrome", "--seed", "-1"], 2, "seed: expected 0 to"),
         (["compare", "nickel", "chrome", "-o", "{}/x.exr"], 2, "expected a name that ends in .png"),
         (["render", "nickel", "-o", "{}/x.jpg"], 2, "expected a name that ends in .png or .exr"),
@@ -288,6 +289,55 @@ def test_help_teaches_by_example(capsys):
         assert status == 0
         assert f"sommerl {command}" in out.split("Example:")[1]
     assert run(capsys, "--version")[1].startswith("sommerl 0.")
+
+
+def test_a_bad_input_among_several_is_found_before_anything_is_written(capsys, tmp_path):
+    arguments = ["compress", "nickel", "nickle", "-o", tmp_path, *QUICK]
+    check_refused(capsys, tmp_path, arguments, 1, "did you mean nickel")
+
+
+def test_compressing_a_compressed_material_again(capsys, folder, tmp_path):
+    result = run_json(capsys, "compress", folder / "pearl.smrl", "-o", tmp_path, "--clusters", 4, "--epochs", 1)
+    assert result["output"] == str(tmp_path / "pearl.smrl")
+    info = run_json(capsys, "info", folder / "pearl.smrl")
+    assert result["source_sha256"] == info["source_sha256"]
+
+
+def test_360_bins_survive_every_command(capsys, tmp_path):
+    lattice = Lattice(phi_d=360, reciprocal=False)
+    values = np.random.default_rng(0).random((*lattice.shape, 1)) * [0.1, 0.2, 0.3]
+    merl.write(BrdfTable(values, lattice), tmp_path / "a.binary")
+    run_json(capsys, "compress", tmp_path / "a.binary", "-o", tmp_path / "a.smrl", *QUICK)
+    assert run_json(capsys, "info", tmp_path / "a.smrl")["lattice"] == [90, 90, 360]
+    run_json(capsys, "convert", tmp_path / "a.smrl", tmp_path / "b.binary")
+    assert load(tmp_path / "b.binary").lattice == lattice
+    result = run_json(capsys, "compare", tmp_path / "a.smrl", tmp_path / "b.binary", *SMALL_PICTURE)
+    assert result["table_rmse"] < 1e-12
+
+
+def test_odd_names_and_terminals(folder, tmp_path):
+    path = tmp_path / "[" / "b].smrl"
+    path.parent.mkdir()
+    path.write_bytes((folder / "pearl.smrl").read_bytes())
+    out, err = start("info", path, env=os.environ | {"PYTHONIOENCODING": "ascii", "COLUMNS": "200"}).communicate()
+    assert err == ""
+    assert str(path) in out
+
+
+def test_a_folder_does_not_hide_a_builtin(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "chrome").mkdir()
+    info = run_json(capsys, "info", "chrome")
+    assert (info["kind"], info["bytes_disk"]) == ("model", None)
+
+
+def test_the_readmes_example_runs(tmp_path, monkeypatch, capsys):
+    readme = (Path(__file__).parent.parent / "README.md").read_text()
+    example = readme.split("```python\n")[1].split("```")[0]
+    monkeypatch.chdir(tmp_path)
+    exec(example.replace("clusters=256", "clusters=16, epochs=1"), {})
+    assert (tmp_path / "nickel.smrl").exists()
+    assert len(capsys.readouterr().out.splitlines()) == 2
 
 
 def start(*arguments, **options):

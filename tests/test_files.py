@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import pytest
 
 from sommerl.files import atomic_write, check_writable
@@ -20,6 +22,15 @@ def test_a_file_appears_whole_or_not_at_all(tmp_path):
         out.write(b"after")
     assert path.read_bytes() == b"after"
     assert path.stat().st_mode & 0o444 == 0o444
+
+
+def test_the_longest_names_work_and_errors_speak_of_the_file_meant(tmp_path):
+    with atomic_write(tmp_path / ("n" * 255)) as out:
+        out.write(b"x")
+    for write in (check_writable, lambda path: atomic_write(path).__enter__()):
+        with pytest.raises(OSError, match="cannot be written") as caught:
+            write(Path("/proc/x.smrl"))
+        assert caught.value.filename == "/proc/x.smrl"
 
 
 def test_what_cannot_be_written_is_said_beforehand(tmp_path):

@@ -4,6 +4,7 @@ from helpers import SMALL, must_fail, random_directions
 
 from sommerl import MERL, Lattice
 from sommerl.arrays import split
+from sommerl.errors import MaterialError
 from sommerl.half_diff import directions, half_diff
 
 NOT_RECIPROCAL = Lattice(phi_d=360, reciprocal=False)
@@ -120,6 +121,18 @@ def test_that_check_notices_clamped_phi_d():
         return SMALL.corners(theta_h, theta_d, np.clip(phi_d, np.pi / 24, np.pi * 23 / 24))
 
     must_fail(check_interpolation, clamped)
+
+
+@pytest.mark.parametrize("lattice", [Lattice(8, 2, 12), Lattice(16, 8, 16), Lattice(90, 45, 90), Lattice(1, 1, 2)])
+def test_extended_takes_nothing_from_below_the_horizon_on_coarse_lattices(lattice):
+    """There, some (θ_h, φ_d) have no cell above the horizon at all."""
+    values = np.where(lattice.above_horizon, 1.0, np.nan)
+    assert (lattice.extended(values) == 1).all()
+
+
+def test_a_lattice_without_cells_is_refused():
+    with pytest.raises(MaterialError, match="at least one bin in each angle"):
+        Lattice(0, 1, 1)
 
 
 def test_extended_continues_the_last_cell_above_the_horizon():

@@ -110,6 +110,12 @@ def test_shinier_materials_get_sharper_lobes():
     assert exponents[0] < 10 < 100 < exponents[2]
 
 
+def test_without_a_highlight_there_is_no_needle():
+    for interpolation in ("nearest", "trilinear"):
+        sampler = BlinnPhongSampler.fitted(lambertian_table(0.7).with_interpolation(interpolation))
+        assert sampler.exponent < 2
+
+
 def test_nothing_below_the_horizon():
     wo = split(np.array([[0.0, 0.6, 0.8], [0.0, 0.6, -0.8], [0.0, 0.6, 0.8]]))
     wi = split(np.array([[0.0, 0.6, -0.8], [0.0, 0.6, 0.8], [0.0, -0.6, 0.8]]))

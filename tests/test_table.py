@@ -59,6 +59,13 @@ def test_nothing_positive_is_refused():
             BrdfTable(np.full((*SMALL.shape, 3), bad), SMALL, name="dark")
 
 
+def test_an_unknown_interpolation_is_refused(small_table):
+    with pytest.raises(MaterialError, match="expected nearest or trilinear, found linear"):
+        small_table.with_interpolation("linear")
+    with pytest.raises(MaterialError, match="expected nearest or trilinear, found linear"):
+        BrdfTable(small_table.values, SMALL, interpolation="linear")
+
+
 def test_another_shape_is_refused():
     with pytest.raises(MaterialError, match=r"expected values of shape \(8, 8, 12, 3\), found \(2, 3\)"):
         BrdfTable(np.ones((2, 3)), SMALL)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import json
 import math
 import sys
@@ -48,6 +49,9 @@ class Parser(argparse.ArgumentParser):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status: 0, 1 for an error in the input, 2 for one in the options."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # not every terminal has a multiplication sign
     options = _parser().parse_args(arguments)
     try:
         result = options.run(options)
@@ -59,8 +63,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fail(f"{error.filename or 'file'}: {error.strerror or error}", 1)
     except MemoryError:
         return _fail("not enough memory", 1)
-    except KeyboardInterrupt:
-        return _fail("interrupted; nothing was left half-written", 130)
     if options.json:
         print(json.dumps(_finite(result), indent=2))
     return 0
@@ -123,7 +125,12 @@ def _compress(add: Any) -> None:
     command.add_argument(
         "-o", "--output", type=Path, required=True, help="a .smrl file; for several inputs, a folder that exists"
     )
-    command.add_argument("--preset", choices=["paper"], default="paper", help="the representation (%(default)s)")
+    command.add_argument(
+        "--preset",
+        choices=["paper"],
+        default="paper",
+        help="the representation: the full lattice, nearest lookup (%(default)s, the only one so far)",
+    )
     helps = {
         "clusters": "M, the number of entries in the palette",
         "epochs": "how often the table is presented",

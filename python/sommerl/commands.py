@@ -21,19 +21,23 @@ from .render.compare import compare_on_sphere
 from .render.environment import default_environment, load_environment
 from .render.images import side_by_side, write_image
 from .render.llvm import mitsuba
+from .render.scenes import LARGEST_SIZE, sphere
 from .render.scenes import render as render_scene
-from .render.scenes import sphere
 from .som_man import file as smrl
 from .som_man.material import SomManBrdf
 from .som_man.options import TrainOptions
 from .table import BrdfTable
 
-LARGEST_SIZE, MOST_SPP = 8192, 2**20
+SMALLEST_SIZE = 8  # SSIM looks at windows of 7 pixels
+MOST_SPP = 2**20
 
 
 def compress(options: Namespace) -> dict[str, Any]:
     train_options = TrainOptions(**{field.name: getattr(options, field.name) for field in fields(TrainOptions)})
     outputs = _outputs(options.inputs, options.output)
+    if len(options.inputs) > 1:
+        for source in options.inputs:
+            load(source)  # so that a bad one is found before hours are spent on the others
     results = [
         _compress_one(load_table(source), output, train_options, options.json)
         for source, output in zip(options.inputs, outputs, strict=True)
@@ -42,11 +46,11 @@ def compress(options: Namespace) -> dict[str, Any]:
 
 
 def _outputs(inputs: list[str], output: Path) -> list[Path]:
-    """Where each input goes; said before hours are spent on training."""
+    """Where each input goes."""
     if len(inputs) == 1 and not output.is_dir():
         outputs = [output]
     elif output.is_dir():
-        outputs = [output / f"{Path(source).name.removesuffix('.binary')}.smrl" for source in inputs]
+        outputs = [output / f"{_stem(source)}.smrl" for source in inputs]
     else:
         raise OptionError(f"{output}: expected a folder that exists, for several inputs")
     if len(set(outputs)) < len(outputs):
@@ -56,6 +60,10 @@ def _outputs(inputs: list[str], output: Path) -> list[Path]:
             raise OptionError(f"{path}: expected a name that ends in .smrl, found {path.suffix!r}")
         check_writable(path)
     return outputs
+
+
+def _stem(source: str) -> str:
+    return Path(source).name.removesuffix(".binary").removesuffix(".smrl")
 
 
 def _compress_one(table: BrdfTable, output: Path, options: TrainOptions, quiet: bool) -> dict[str, Any]:
@@ -70,7 +78,7 @@ def _compress_one(table: BrdfTable, output: Path, options: TrainOptions, quiet: 
 def info(options: Namespace) -> dict[str, Any]:
     brdf = load(options.material)
     path = Path(options.material)
-    on_disk = path.stat().st_size if path.exists() else 0
+    on_disk = path.stat().st_size if path.is_file() else None
     result = describe(brdf, on_disk)
     if not options.json:
         shown = {key: value for key, value in result.items() if value is not None}
@@ -95,8 +103,9 @@ def convert(options: Namespace) -> dict[str, Any]:
     merl.write(table, options.output)
     written = options.output.stat().st_size
     if not options.json:
-        print(f"{table.name} → {options.output} ({console.size(written)})")
-    return {"output": str(options.output), "bytes_disk": written}
+        clamped = f", {table.cells_clamped} cells clamped to 0" if table.cells_clamped else ""
+        print(f"{table.name} → {options.output} ({console.size(written)}{clamped})")
+    return {"output": str(options.output), "bytes_disk": written, "cells_clamped": table.cells_clamped}
 
 
 def compare(options: Namespace) -> dict[str, Any]:
@@ -188,11 +197,9 @@ def _check_image(path: Path, extensions: tuple[str, ...]) -> None:
 
 def _environment(options: Namespace) -> Any:
     """The environment asked for; checks the other options of rendering, too."""
-    for name, high in (("spp", MOST_SPP), ("size", LARGEST_SIZE)):
-        if not 1 <= getattr(options, name) <= high:
-            raise OptionError(f"{name}: expected 1 to {high}, found {getattr(options, name)}")
-    if not 0 <= options.seed < 2**16:
-        raise OptionError(f"seed: expected 0 to {2**16 - 1}, found {options.seed}")
+    for name, low, high in (("spp", 1, MOST_SPP), ("size", SMALLEST_SIZE, LARGEST_SIZE), ("seed", 0, 2**64 - 1)):
+        if not low <= getattr(options, name) <= high:
+            raise OptionError(f"{name}: expected {low} to {high}, found {getattr(options, name)}")
     if options.envmap and not options.envmap.is_file():
         raise FormatError(f"{options.envmap}: expected an environment image, found no such file")
     return load_environment(options.envmap) if options.envmap else default_environment()

@@ -18,7 +18,7 @@ def progress(what: str) -> Generator[Advance | None]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %")
+    columns = TextColumn("{task.description}", markup=False), BarColumn(), TextColumn("{task.percentage:>3.0f} %")
     with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(what, total=None)
 
@@ -32,13 +32,14 @@ def print_rows(title: str, rows: Mapping[str, str]) -> None:
     """A table of names and values on standard output."""
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
-    table = Table(title=title, show_header=False, title_justify="left")
+    table = Table(title=Text(title), show_header=False, title_justify="left")
     table.add_column()
     table.add_column(justify="right", overflow="fold")
     for name, value in rows.items():
-        table.add_row(name, value)
-    Console(soft_wrap=False).print(table, markup=False)
+        table.add_row(Text(name), Text(value))
+    Console().print(table)
 
 
 def size(count: int) -> str:

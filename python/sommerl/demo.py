@@ -9,6 +9,7 @@ from typing import Any
 
 from . import console
 from .describe import compression_rows, describe, image_rows, trained
+from .files import check_writable
 from .formats import merl
 from .load import load_table
 from .render.compare import compare_on_sphere
@@ -32,6 +33,8 @@ def demo(options: Namespace) -> dict[str, Any]:
             "page": "index.html",
         }.items()
     }
+    for path in paths.values():
+        check_writable(path)
     table = load_table(MATERIAL).with_interpolation("nearest")
     material, report = trained(table, TrainOptions())
     written = smrl.save(material, paths["material"])

@@ -17,14 +17,16 @@ def atomic_write(path: Path) -> Generator[BinaryIO]:
 
     Raises OSError if it cannot be written; whatever had that name before is then still there.
     """
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    with _named(path):
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".sommerl-")
     try:
         with os.fdopen(handle, "wb") as out:
             yield out
         umask = os.umask(0)
         os.umask(umask)
         os.chmod(temporary, 0o666 & ~umask)  # mkstemp makes files that only their owner can read
-        os.replace(temporary, path)
+        with _named(path):
+            os.replace(temporary, path)
     except BaseException:
         os.unlink(temporary)
         raise
@@ -36,5 +38,14 @@ def check_writable(path: Path) -> None:
         raise IsADirectoryError(errno.EISDIR, "expected a file to write, found a directory", str(path))
     if not path.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, f"cannot be written: there is no folder {path.parent}", str(path))
-    with tempfile.TemporaryFile(dir=path.parent):
+    with _named(path), tempfile.TemporaryFile(dir=path.parent):
         pass
+
+
+@contextmanager
+def _named(path: Path) -> Generator[None]:
+    """Errors speak of the file that was meant, not of a temporary one."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, f"cannot be written ({error.strerror})", str(path)) from error

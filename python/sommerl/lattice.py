@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Array, Triple, ops
+from .errors import MaterialError
 from .half_diff import TWO_PI, half_diff
 
 Interpolation = Literal["nearest", "trilinear"]
@@ -34,6 +35,10 @@ class Lattice:
     theta_d: int = 90
     phi_d: int = 180
     reciprocal: bool = True
+
+    def __post_init__(self) -> None:
+        if min(self.shape) < 1:
+            raise MaterialError(f"lattice: expected at least one bin in each angle, found {self.shape}")
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -84,13 +89,13 @@ class Lattice:
     def extended(self, values: NDArray[Any]) -> NDArray[Any]:
         """`values`, of the lattice's shape (…), with every cell below the horizon set to the last one above it in θ_d.
 
-        A pair of directions just above the horizon may fall into a cell whose centre is below it, or have such
+        Where a coarse lattice has none in θ_d, it is the last in θ_h that has. A pair of directions just above the horizon may fall into a cell whose centre is below it, or have such
         a cell as a neighbour when interpolating.
         """
+        h, d, p = np.ogrid[: self.theta_h, : self.theta_d, : self.phi_d]
+        h = np.minimum(h, self.above_horizon[:, :1].sum(axis=0, keepdims=True) - 1)
         last = self.above_horizon.sum(axis=1, keepdims=True) - 1
-        theta_d = np.minimum(np.arange(self.theta_d)[None, :, None], last)
-        h, p = np.ogrid[: self.theta_h, : self.phi_d]
-        return values[h[:, None], theta_d, p[:, None]]
+        return values[h, np.minimum(d, last[h, 0, p]), p]
 
     def cell(self, theta_h: Array, theta_d: Array, phi_d: Array) -> Array:
         """The number of the cell that holds the given angles [rad]."""
@@ -144,6 +149,13 @@ class Lattice:
 
 
 MERL = Lattice()
+
+
+def checked(interpolation: Interpolation) -> Interpolation:
+    """The same. Raises MaterialError if there is no such interpolation."""
+    if interpolation not in INTERPOLATIONS:
+        raise MaterialError(f"interpolation: expected {' or '.join(INTERPOLATIONS)}, found {interpolation}")
+    return interpolation
 
 
 def _between(f: Any, position: Array, bins: int) -> tuple[Array, Array, Array]:

@@ -9,6 +9,7 @@ from .errors import FormatError
 from .formats import merl
 from .materials import NAMES, builtin
 from .som_man import file as smrl
+from .som_man.material import SomManBrdf
 from .table import BrdfTable
 
 HEAD_BYTES = 12
@@ -20,7 +21,7 @@ def load(source: str | Path) -> Brdf:
     Raises FormatError for a file in no known format, MaterialError for a name that is neither file nor built-in.
     """
     path = Path(source)
-    if str(source) in NAMES and not path.exists():
+    if str(source) in NAMES and not path.is_file():
         return builtin(str(source))
     if not path.exists():
         if path.suffix or len(path.parts) > 1:
@@ -45,4 +46,6 @@ def load(source: str | Path) -> Brdf:
 def load_table(source: str | Path) -> BrdfTable:
     """The material as a table on its own lattice; a formula is evaluated at the cell centres of MERL's."""
     brdf = load(source)
+    if isinstance(brdf, SomManBrdf):
+        return BrdfTable(brdf.values(), brdf.lattice, name=brdf.name, source_sha256=brdf.source_sha256)
     return brdf if isinstance(brdf, BrdfTable) else BrdfTable.sample(brdf)

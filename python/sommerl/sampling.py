@@ -38,6 +38,8 @@ class BlinnPhongSampler:
         f_r = brdf.eval(np.stack(wi, -1), np.stack(wo, -1)).mean(axis=-1)
         base = f_r.min()
         light = (f_r - base) * np.sin(2 * theta_h) * np.gradient(theta_h)
+        if light.sum() <= 1e-6 * base:  # no highlight: what looks like one is rounding
+            return cls(1.0, 0.1)
         half = theta_h[np.searchsorted(np.cumsum(light), light.sum() / 2)]
         exponent = min(SHARPEST, max(1.0, math.log(0.5) / math.log(math.cos(max(half, 1e-3))) - 1))
         # A half vector's solid angle maps to one about four times as large around the light's direction.

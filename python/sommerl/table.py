@@ -13,7 +13,7 @@ from .arrays import Triple, gather3
 from .brdf import Brdf, Buffers
 from .errors import MaterialError
 from .half_diff import directions
-from .lattice import MERL, Interpolation, Lattice
+from .lattice import MERL, Interpolation, Lattice, checked
 
 
 class BrdfTable(Brdf):
@@ -46,7 +46,7 @@ class BrdfTable(Brdf):
             raise MaterialError(f"{name}: expected a positive reflectance above the horizon, found none")
         self.name = name
         self.lattice = lattice
-        self.interpolation: Interpolation = interpolation
+        self.interpolation = checked(interpolation)
         self.cells_clamped = int(unusable.any(axis=-1).sum())
         self.values: NDArray[np.float64] = lattice.extended(f_r)
         self.source_sha256 = source_sha256 or hashlib.sha256(self.values.astype("<f8").tobytes()).hexdigest()
@@ -63,7 +63,7 @@ class BrdfTable(Brdf):
     def with_interpolation(self, interpolation: Interpolation) -> BrdfTable:
         """The same cells, looked up in another way."""
         other = copy(self)
-        other.interpolation = interpolation
+        other.interpolation = checked(interpolation)
         return other
 
     def buffers(self) -> dict[str, NDArray[Any]]:

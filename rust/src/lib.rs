@@ -21,7 +21,7 @@ fn matrix<'py, T: numpy::Element + Copy>(py: Python<'py>, rows: Vec<[T; 3]>) -> 
     rows.as_flattened().to_pyarray(py).reshape([rows.len(), 3])
 }
 
-#[pyclass]
+#[pyclass(subclass)]
 struct Learner {
     inner: train::Learner,
     rule: train::Rule,

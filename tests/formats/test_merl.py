@@ -1,9 +1,14 @@
+import os
+
 import numpy as np
 import pytest
+from helpers import must_fail, random_directions
 
 from sommerl import MERL, BrdfTable, Lattice, load
+from sommerl.arrays import split
 from sommerl.errors import FormatError, MaterialError
 from sommerl.formats import merl
+from sommerl.half_diff import half_diff
 
 RNG = np.random.default_rng(0)
 
@@ -20,7 +25,7 @@ def test_scale_and_order_of_the_planes(tmp_path):
     planes[cell], planes[MERL.size + cell], planes[2 * MERL.size + cell] = 1500, 3000, 4500
     path = tmp_path / "x.binary"
     path.write_bytes(raw(planes=planes))
-    table = merl.read(path)
+    table = merl.read(str(path))
     assert np.allclose(table.values[3, 20, 7], [1, 2 * 1.15, 3 * 1.66], rtol=1e-15)
     assert np.allclose(table.values[3, 20, 8], np.array([1, 1.15, 1.66]) / 1500, rtol=1e-15)
 
@@ -49,11 +54,35 @@ def test_360_bins_are_not_reciprocal(tmp_path):
     assert sorted([table.eval(wi, wo)[0], table.eval(wo, wi)[0]]) == pytest.approx([1, 2])
 
 
+def check_what_is_written_below(stored):
+    """Negative only where no pair of directions above the horizon looks; 76.2 % of the cells are above in part."""
+    cells = MERL.cell(*half_diff(split(random_directions(1_000_000, 1)), split(random_directions(1_000_000, 2))))
+    assert (stored.reshape(3, -1)[:, cells] > 0).all()
+    assert (stored > 0).mean() == pytest.approx(0.766, abs=5e-3)
+
+
 def test_below_the_horizon_is_written_as_the_database_does(tmp_path):
     path = tmp_path / "table.binary"
     merl.write(BrdfTable(np.ones((*MERL.shape, 3))), path)
     stored = np.fromfile(path, "<f8", offset=12).reshape(3, *MERL.shape)
-    assert ((stored < 0) == ~MERL.above_horizon).all()
+    assert (stored[:, ~MERL.above_horizon] < 0).mean() > 0.9
+    check_what_is_written_below(stored)
+    must_fail(check_what_is_written_below, np.where(MERL.above_horizon, stored, -1))
+
+
+def test_an_oversized_file_is_not_read(tmp_path):
+    path = tmp_path / "huge.binary"
+    with path.open("wb") as stream:
+        stream.write(np.array(MERL.shape, "<i4").tobytes())
+        stream.truncate(2**40)
+    with pytest.raises(FormatError, match="expected 34992012 bytes for these dimensions, found 1099511627776"):
+        load(path)
+
+
+def test_names_that_are_not_text_become_text(tmp_path):
+    path = tmp_path / os.fsdecode(b"n\xff.binary")
+    merl.write(BrdfTable(np.ones((*MERL.shape, 3))), path)
+    assert load(path).name == "n\ufffd"
 
 
 def test_another_lattice_is_not_written(tmp_path, small_table):

@@ -44,6 +44,12 @@ def test_same_seed_same_pixels_another_seed_others(small_table):
     assert not np.array_equal(pixels(3), pixels(4))
 
 
+def test_any_seed_serves_and_none_repeats_another(small_table):
+    scene = sphere(small_table, WHITE, size=8)
+    images = [render(scene, spp=2, seed=seed).pixels.tobytes() for seed in (0, 1, 65536, 2**40)]
+    assert len(set(images)) == 4
+
+
 def test_passes_add_up_and_are_reported(small_table, monkeypatch):
     scene = sphere(small_table, default_environment(32), size=16)
     whole = render(scene, spp=64)

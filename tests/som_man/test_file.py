@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from helpers import SMALL, must_fail
 
-from sommerl import SommerlError, TrainOptions, load, save, train
-from sommerl.errors import FormatError
+from sommerl import SomManBrdf, SommerlError, TrainOptions, load, save, train
+from sommerl.errors import FormatError, MaterialError
 from sommerl.som_man.file import FILTERS, PREFIX, decode, encode
 
 
@@ -156,6 +156,26 @@ def test_errors_name_the_file(material, tmp_path):
     path.write_bytes(encode(material)[:-1])
     with pytest.raises(SommerlError, match=r"cut\.smrl: expected the checksum"):
         load(path)
+
+
+def test_paths_may_be_strings(material, tmp_path):
+    save(material, f"{tmp_path}/x.smrl")
+    check_round_trip(material, load(f"{tmp_path}/x.smrl"))
+
+
+def test_a_file_that_cannot_be_one_is_not_read(tmp_path):
+    path = tmp_path / "huge.smrl"
+    with path.open("wb") as stream:
+        stream.write(b"SMRL\0\0")
+        stream.truncate(2**40)
+    with pytest.raises(FormatError, match="expected at most"):
+        load(path)
+
+
+def test_an_index_of_another_type_is_refused(small_table):
+    for dtype in (np.int32, np.float32):
+        with pytest.raises(MaterialError, match="unsigned index"):
+            SomManBrdf(np.ones((1, 3)), np.zeros(SMALL.shape, dtype), SMALL, name="x")
 
 
 def test_sizes_are_counted_as_stated(material):

@@ -154,6 +154,30 @@ def test_lambertian_goes_through():
     assert report.quantisation_error == [0.0, 0.0]
 
 
+def test_no_call_into_the_core_takes_long(small_table, monkeypatch):
+    """An interruption waits for the end of a call; so each of them is bounded, the query's too."""
+    monkeypatch.setattr("sommerl.som_man.train.COMPARISONS_A_CALL", 640)
+    counts = []
+
+    class Kernels:
+        class Learner(_core.Learner):
+            def present(self, cells, alpha, falloff):
+                counts.append(len(cells) * 16)
+                return super().present(cells, alpha, falloff)
+
+        @staticmethod
+        def query(triples, lut):
+            counts.append(len(triples) * len(lut))
+            return _core.query(triples, lut)
+
+    options = TrainOptions(clusters=16, epochs=2)
+    material, _ = train(small_table, options, kernels=Kernels)
+    assert max(counts) <= 640
+    assert sum(counts) == 3 * 16 * SMALL.above_horizon.sum()
+    monkeypatch.undo()
+    assert np.array_equal(material.index, train(small_table, options)[0].index)
+
+
 def test_report_and_progress(small_table):
     steps = []
     _, report = train(small_table, TrainOptions(clusters=8, epochs=6), progress=lambda *step: steps.append(step))
@@ -168,13 +192,20 @@ def test_report_and_progress(small_table):
     ("option", "value"),
     [
         ("clusters", 0), ("clusters", 65537), ("epochs", 0), ("seed", -1), ("alpha", 0.0), ("alpha", 1.5),
-        ("alpha", float("nan")), ("radius", -1.0), ("radius", float("inf")), ("rule", "hebb"), ("order", "up"),
+        ("alpha", float("nan")), ("clusters", 4.5), ("seed", "one"), ("alpha", None), ("radius", -1.0), ("radius", float("inf")), ("rule", "hebb"), ("order", "up"),
         ("topology", "torus"),
     ],
 )  # fmt: skip
 def test_senseless_options_are_refused(option, value):
     with pytest.raises(OptionError, match=f"^{option}: expected .*, found"):
         TrainOptions(**{option: value})
+
+
+def test_options_may_be_numpys_numbers():
+    options = TrainOptions(clusters=np.int64(4), seed=np.uint8(1), alpha=np.float32(0.5), radius=2)
+    assert [type(value) for value in (options.clusters, options.seed, options.alpha, options.radius)] == [
+        int, int, float, float,
+    ]  # fmt: skip
 
 
 def test_the_core_refuses_what_would_read_outside():

@@ -7,9 +7,11 @@ data that is not reciprocal.
 from __future__ import annotations
 
 import hashlib
+import os
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import FormatError
 from ..files import atomic_write
@@ -30,22 +32,25 @@ def looks_like(head: bytes) -> bool:
     return len(head) >= HEADER_BYTES and _dimensions(head) in LATTICES
 
 
-def read(path: Path) -> BrdfTable:
+def read(path: str | Path) -> BrdfTable:
     """The table in a MERL file. Raises FormatError if it is not one, MaterialError if nothing in it is positive."""
-    data = path.read_bytes()
-    if len(data) < HEADER_BYTES:
-        raise FormatError(f"{path}: expected a MERL header of {HEADER_BYTES} bytes, found {len(data)}")
-    dimensions = _dimensions(data)
+    path = Path(path)
+    length = path.stat().st_size
+    if length < HEADER_BYTES:
+        raise FormatError(f"{path}: expected a MERL header of {HEADER_BYTES} bytes, found {length}")
+    with path.open("rb") as stream:
+        dimensions = _dimensions(stream.read(HEADER_BYTES))
     if dimensions not in LATTICES:
         known = " or ".join("×".join(map(str, known)) for known in LATTICES)
         raise FormatError(f"{path}: expected MERL dimensions {known}, found {'×'.join(map(str, dimensions))}")
     lattice = LATTICES[dimensions]
     expected = bytes_on_disk(lattice)
-    if len(data) != expected:
-        raise FormatError(f"{path}: expected {expected} bytes for these dimensions, found {len(data)}")
+    if length != expected:
+        raise FormatError(f"{path}: expected {expected} bytes for these dimensions, found {length}")
+    data = path.read_bytes()
     planes = np.frombuffer(data, "<f8", offset=HEADER_BYTES).reshape(3, *lattice.shape)
     values = np.moveaxis(planes, 0, -1) * SCALE
-    return BrdfTable(values, lattice, name=path.stem, source_sha256=hashlib.sha256(data).hexdigest())
+    return BrdfTable(values, lattice, name=_printable(path.stem), source_sha256=hashlib.sha256(data).hexdigest())
 
 
 def bytes_on_disk(lattice: Lattice) -> int:
@@ -53,15 +58,29 @@ def bytes_on_disk(lattice: Lattice) -> int:
     return HEADER_BYTES + 3 * 8 * lattice.size
 
 
-def write(table: BrdfTable, path: Path) -> None:
+def write(table: BrdfTable, path: str | Path) -> None:
     """Writes a table in MERL's format. Raises FormatError if it has another lattice."""
     if table.lattice not in LATTICES.values():
         raise FormatError(f"{path}: expected a MERL lattice, found {table.lattice}")
-    stored = np.where(table.lattice.above_horizon[..., None], table.values / SCALE, BELOW_HORIZON)
-    with atomic_write(path) as out:
+    stored = np.where(_reachable(table.lattice)[..., None], table.values / SCALE, BELOW_HORIZON)
+    with atomic_write(Path(path)) as out:
         out.write(np.array(table.lattice.shape, "<i4").tobytes())
         for channel in range(3):
             out.write(stored[..., channel].astype("<f8").tobytes())
+
+
+def _reachable(lattice: Lattice) -> NDArray[np.bool_]:
+    """Cells of which any part is above the horizon: other readers look these up, too."""
+    theta_h = (np.arange(90) / 90) ** 2 * np.pi / 2
+    theta_d = np.arange(90) / 90 * np.pi / 2
+    edges = np.abs(np.cos(np.arange(lattice.phi_d + 1) / lattice.phi_d * lattice.phi_d_range))
+    tilt = np.sin(theta_h)[:, None, None] * np.sin(theta_d)[:, None] * np.minimum(edges[1:], edges[:-1])
+    return np.cos(theta_h)[:, None, None] * np.cos(theta_d)[:, None] > tilt
+
+
+def _printable(name: str) -> str:
+    """A file's name without the bytes that are not text."""
+    return os.fsencode(name).decode("utf-8", "replace")
 
 
 def _dimensions(head: bytes) -> tuple[int, ...]:

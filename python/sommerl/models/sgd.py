@@ -30,7 +30,7 @@ class ShiftedGamma(Brdf):
         f = ops(wi[0])
         theta_h, theta_d, _ = half_diff(wi, wo)
         theta_i, theta_o = (f.atan2(f.sqrt(w[0] * w[0] + w[1] * w[1]), w[2]) for w in (wi, wo))
-        cos_h, cos_d, cosines = f.cos(theta_h), f.cos(theta_d), wi[2] * wo[2]
+        cos_h, cos_d, cosines = f.cos(theta_h), f.cos(theta_d), f.maximum(wi[2] * wo[2], 1e-30)
         r, g, b = (self._channel(q, cos_h, cos_d, theta_i, theta_o, cosines) for q in self._channels)
         return r, g, b
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,12 +26,17 @@ def make_bsdf(brdf: Brdf, sampler: BlinnPhongSampler | None = None) -> Any:
 
 
 def register() -> None:
-    """Makes the plug-in `sommerl` known to scene files; its property `filename` is a path or a built-in's name."""
-    mitsuba().register_bsdf("sommerl", lambda props: _from_file(props))  # pyright: ignore
+    """Makes the plug-in `sommerl` known to scenes in Mitsuba's present variant, as Mitsuba's own Python plug-ins are.
+
+    Its property `filename` is a built-in's name, or a path, which may be relative to the scene file.
+    """
+    mitsuba().register_bsdf("sommerl", _from_properties)
 
 
-def _from_file(props: Any) -> Any:
-    brdf = load(str(props["filename"]))
+def _from_properties(props: Any) -> Any:
+    name = str(props["filename"])
+    found = str(mitsuba().file_resolver().resolve(name))
+    brdf = load(found if Path(found).is_file() else name)
     return _plugin()(props, brdf, BlinnPhongSampler.fitted(brdf))
 
 
@@ -50,9 +56,13 @@ def upload(buffer: NDArray[Any]) -> Any:
             return array
 
 
-@cache
 def _plugin() -> Any:
-    """The class, which exists only once a variant is set."""
+    """The class for Mitsuba's present variant."""
+    return _plugin_for(mitsuba().variant())
+
+
+@cache
+def _plugin_for(variant: str) -> Any:
     mi, dr = mitsuba(), drjit()
 
     class SommerlBsdf(mi.BSDF):

@@ -26,21 +26,30 @@ OLDEST_LLVM = 17
 PATH_VARIABLE = "DRJIT_LIBLLVM_PATH"
 
 
-@cache
 def mitsuba() -> Any:
-    """The module `mitsuba` with a variant set: CUDA if there is a GPU, else LLVM, else scalar with a warning.
+    """The module `mitsuba` with a variant set: the one that is set already; else CUDA if there is a GPU, else LLVM, else
+    scalar with a warning.
 
-    Raises MissingDependencyError if Mitsuba is not installed.
+    Raises MissingDependencyError if Mitsuba is not installed, or the variant that is set is not one of RGB.
     """
+    mi = _module()
+    if mi.variant() is None:
+        mi.set_variant(_variant(mi))
+    if not mi.variant().endswith("rgb"):
+        raise MissingDependencyError(
+            f"Mitsuba's variant: expected one of RGB, such as llvm_ad_rgb, found {mi.variant()}"
+        )
+    return mi
+
+
+@cache
+def _module() -> Any:
     if importlib.util.find_spec("mitsuba") is None:
         raise MissingDependencyError("rendering needs Mitsuba: install sommerl[render]")
     if "drjit" not in sys.modules:
         path = find_llvm()
         os.environ[PATH_VARIABLE] = path or os.devnull  # never the one that Dr.Jit would find by itself
-    mi: Any = importlib.import_module("mitsuba")
-    mi.set_variant(_variant(mi))
-    mi.set_log_level(mi.LogLevel.Error)
-    return mi
+    return importlib.import_module("mitsuba")
 
 
 def drjit() -> Any:

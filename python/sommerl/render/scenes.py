@@ -15,7 +15,8 @@ from ..sampling import BlinnPhongSampler
 from .bsdf import make_bsdf
 from .llvm import drjit, mitsuba
 
-SAMPLES_A_PASS = 2**22  # bounds memory; Mitsuba crashes beyond 2^32
+LARGEST_SIZE = 2048  # a pass of one sample a pixel then still fits into 1 GB
+SAMPLES_A_PASS = 2**22  # or one a pixel: bounds memory, and Mitsuba crashes beyond 2^32
 FILL = 0.9  # of the frame's height, by the sphere
 DISTANCE = 5.0  # of the camera, in radii of the sphere
 DEFAULT_SIZE, DEFAULT_SPP = 256, 256
@@ -73,11 +74,16 @@ def render(scene: Any, *, spp: int = DEFAULT_SPP, seed: int = 0, progress: Progr
     total = np.zeros((height, width, 3))
     for number in range(passes):
         samples = min(chunk, spp - number * chunk)
-        pixels = np.array(mi.render(scene, spp=samples, seed=(seed << 16) + number))
+        pixels = np.array(mi.render(scene, spp=samples, seed=_seed(seed, number)))
         total += samples * pixels.astype(np.float64)
         if progress:
             progress(number + 1, passes)
     return Image((total / spp).astype(np.float32), _mask(scene, width, height))
+
+
+def _seed(seed: int, number: int) -> int:
+    """A seed of 32 bits for one pass: different for every pass of every seed, as far as 32 bits go."""
+    return int(np.random.SeedSequence([seed, number]).generate_state(1)[0])
 
 
 def _mask(scene: Any, width: int, height: int) -> NDArray[np.bool_]:

@@ -26,13 +26,14 @@ from numpy.typing import NDArray
 
 from ..errors import FormatError, SommerlError
 from ..files import atomic_write
-from ..lattice import INTERPOLATIONS, Lattice
+from ..lattice import Lattice
 from .material import SomManBrdf
 
 MAGIC = b"SMRL"
 VERSION = 0
 PREFIX = struct.Struct("<4sHII")
-MOST_CELLS = 2**24
+MOST_CELLS = 2**22  # MERL's larger kind of table has 2,916,000
+LONGEST_FILE = 2 * MOST_CELLS + 24 * 2**16 + 2**20
 FILTERS = [{"id": lzma.FILTER_LZMA2, "preset": 9 | lzma.PRESET_EXTREME, "lc": 0, "lp": 0, "pb": 0}]
 
 
@@ -41,16 +42,20 @@ def looks_like(head: bytes) -> bool:
     return head.startswith(MAGIC)
 
 
-def save(material: SomManBrdf, path: Path) -> int:
+def save(material: SomManBrdf, path: str | Path) -> int:
     """Writes a material file; returns its length [bytes]."""
     data = encode(material)
-    with atomic_write(path) as out:
+    with atomic_write(Path(path)) as out:
         out.write(data)
     return len(data)
 
 
-def load(path: Path) -> SomManBrdf:
+def load(path: str | Path) -> SomManBrdf:
     """The material in a file. Raises FormatError if it is not one, or is damaged, or is of another version."""
+    path = Path(path)
+    length = path.stat().st_size
+    if length > LONGEST_FILE:
+        raise FormatError(f"{path}: expected at most {LONGEST_FILE} bytes, found {length}")
     try:
         return decode(path.read_bytes())
     except SommerlError as error:
@@ -102,12 +107,10 @@ def _header(material: SomManBrdf) -> dict[str, Any]:
 def _material(header: dict[str, Any], compressed: bytes) -> SomManBrdf:
     lattice, clusters, interpolation = Lattice(**header["lattice"]), header["clusters"], header["interpolation"]
     sides = (*lattice.shape, clusters)
-    if not all(type(n) is int and n >= 1 for n in sides) or lattice.size > MOST_CELLS or clusters > 2**16:
+    if not all(type(n) is int for n in sides) or lattice.size > MOST_CELLS or not 1 <= clusters <= 2**16:
         raise FormatError(f"expected a lattice of at most {MOST_CELLS} cells and a LUT of at most 65536 entries")
     if type(lattice.reciprocal) is not bool:
         raise FormatError(f"expected a lattice that is reciprocal or not, found {lattice.reciprocal}")
-    if interpolation not in INTERPOLATIONS:
-        raise FormatError(f"expected interpolation {' or '.join(INTERPOLATIONS)}, found {interpolation}")
     above = lattice.above_horizon
     entry = np.dtype("<u1" if clusters <= 256 else "<u2")
     payload = _decompress(compressed, 24 * clusters + entry.itemsize * int(above.sum()))

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import Triple, gather3, ops
 from ..brdf import Brdf, Buffers
 from ..errors import MaterialError
-from ..lattice import Interpolation, Lattice
+from ..lattice import Interpolation, Lattice, checked
 
 
 class SomManBrdf(Brdf):
@@ -41,13 +41,14 @@ class SomManBrdf(Brdf):
             raise MaterialError(f"{name}: expected a LUT of shape (1 to 65536, 3), found {self.lut.shape}")
         if not (np.isfinite(self.lut).all() and (self.lut >= 0).all()):
             raise MaterialError(f"{name}: expected finite, non-negative LUT entries, found others")
-        if index.shape != lattice.shape:
-            raise MaterialError(f"{name}: expected an index of shape {lattice.shape}, found {index.shape}")
+        if index.shape != lattice.shape or index.dtype.kind != "u":
+            found = f"{index.dtype} of shape {index.shape}"
+            raise MaterialError(f"{name}: expected an unsigned index of shape {lattice.shape}, found {found}")
         if index[lattice.above_horizon].max() >= len(self.lut):
             raise MaterialError(f"{name}: expected indices below {len(self.lut)}, found {index.max()}")
         self.name = name
         self.lattice = lattice
-        self.interpolation: Interpolation = interpolation
+        self.interpolation = checked(interpolation)
         self.options = dict(options or {})
         self.metrics = dict(metrics or {})
         self.source_sha256 = source_sha256

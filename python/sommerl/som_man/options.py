@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite
+from operator import index
 from typing import Literal, get_args
 
 from ..errors import OptionError
@@ -44,6 +45,17 @@ class TrainOptions:
             if getattr(self, field) not in get_args(allowed):
                 expected = " or ".join(get_args(allowed))
                 raise OptionError(f"{field}: expected {expected}, found {getattr(self, field)}")
+        for field, kind in (
+            ("clusters", index),
+            ("epochs", index),
+            ("seed", index),
+            ("alpha", float),
+            ("radius", float),
+        ):
+            try:
+                object.__setattr__(self, field, kind(getattr(self, field)))  # NumPy's numbers become Python's
+            except (TypeError, ValueError) as error:
+                raise OptionError(f"{field}: expected a number, found {getattr(self, field)!r}") from error
         for field, low, high in (("clusters", 1, 2**16), ("epochs", 1, 10_000), ("seed", 0, 2**64 - 1)):
             if not low <= getattr(self, field) <= high:
                 raise OptionError(f"{field}: expected {low} to {high}, found {getattr(self, field)}")

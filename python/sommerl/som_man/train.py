@@ -62,7 +62,9 @@ def train(
     # By brightness: like entries get like numbers, which makes the index smooth and its file small.
     cells = cells[np.argsort((rgb[cells, 0] + rgb[cells, 1]) + rgb[cells, 2], kind="stable")]
     index = np.zeros(table.lattice.shape, np.uint8 if len(cells) <= 256 else np.uint16)
-    index[above] = kernels.query(x, x[cells])
+    index[above] = np.concatenate(
+        [kernels.query(x[start:stop], x[cells]) for start, stop in _calls(len(x), len(cells))]
+    )
     material = SomManBrdf(
         rgb[cells], index, table.lattice, name=table.name, options=asdict(options), source_sha256=table.source_sha256
     )
@@ -106,20 +108,24 @@ def _falloff(sigma: float) -> NDArray[np.float32]:
 
 def _learn(learner: Any, order: NDArray[np.uint32], options: TrainOptions, progress: Progress | None) -> list[float]:
     """All epochs; the quantisation error of each."""
-    chunk = max(1, COMPARISONS_A_CALL // options.clusters)
     alpha = np.float32(options.alpha)
     errors: list[float] = []
     for epoch in range(options.epochs):
         falloff = _falloff(options.radius * ALPHA_DECAY**epoch)
         total = 0.0
-        for start in range(0, len(order), chunk):
-            cells = order[start : start + chunk]
-            total += learner.present(cells, float(alpha), falloff)
+        for start, stop in _calls(len(order), options.clusters):
+            total += learner.present(order[start:stop], float(alpha), falloff)
             if progress:
-                progress(epoch * len(order) + start + len(cells), options.epochs * len(order))
+                progress(epoch * len(order) + stop, options.epochs * len(order))
         errors.append(total / len(order))
         alpha = alpha * np.float32(ALPHA_DECAY)
     return errors
+
+
+def _calls(cells: int, entries: int) -> list[tuple[int, int]]:
+    """Ranges of cells, each small enough that comparing it with all entries cannot hold up an interruption."""
+    chunk = max(1, COMPARISONS_A_CALL // entries)
+    return [(start, min(start + chunk, cells)) for start in range(0, cells, chunk)]
 
 
 def _lut_cells(weights: NDArray[np.float32], stored: NDArray[np.uint32], x: NDArray[np.float32]) -> NDArray[np.uint32]:
