@@ -102,7 +102,7 @@ def test_convert_there_and_back(capsys, folder, tmp_path):
     result = run_json(capsys, "convert", folder / "pearl.smrl", tmp_path / "back.binary")
     assert result["bytes_disk"] == 34_992_012
     back, material = merl.read(tmp_path / "back.binary"), load(folder / "pearl.smrl")
-    assert np.allclose(back.values, material.values(), rtol=1e-15)
+    assert np.allclose(back.values, material.values, rtol=1e-15)
 
 
 def test_convert_to_smrl_compresses_with_the_defaults(capsys, folder, tmp_path, monkeypatch):
@@ -239,12 +239,13 @@ def test_bad_files_are_refused_by_every_command(capsys, tmp_path, command, name)
         (["compress", "nickel", "-o", "{}/x.binary"], 2, "expected a name that ends in .smrl, found '.binary'"),
         (["compress", "nickel", "chrome", "-o", "{}/x.smrl"], 2, "expected a folder that exists"),
         (["compress", "nickel", "nickel", "-o", "{}"], 2, "two that would be written to one file"),
+        (["render", "nickel", "-o", "{}/x.png", "--lookup", "nearest"], 1, "found a formula"),
         (["compress", "nickel", "-o", "{}/x.smrl", "--clusters", "0"], 2, "clusters: expected 1 to 65536, found 0"),
         (["compress", "nickel", "-o", "{}/x.smrl", "--clusters", "many"], 2, "invalid int value: 'many'"),
         (["compress", "nickel", "-o", "{}/x.smrl", "--alpha", "nan"], 2, "alpha: expected a number above 0"),
         (["compress", "nickel", "-o", "{}/x.smrl", "--rule", "hebb"], 2, "invalid choice: 'hebb'"),
         (["compress", "nickel"], 2, "required: -o"),
-        (["convert", "nickel", "{}/x.obj"], 2, "expected a name that ends in .binary or .smrl"),
+        (["convert", "nickel", "{}/x.obj"], 2, "expected a name that ends in .binary or .smrl, found '.obj'"),
         (["convert", "nickel", "{}/none/x.binary"], 1, "there is no folder"),
         (["convert", "{}/none.binary", "{}/x.binary", "--noise", "1"], 2, "noise: expected a built-in material"),
         (["convert", "nickel", "{}/x.binary", "--noise", "-1"], 2, "noise: expected a seed"),
@@ -253,7 +254,7 @@ def test_bad_files_are_refused_by_every_command(capsys, tmp_path, command, name)
         (["compare", "nickel", "chrome", "--seed", "-1"], 2, "seed: expected 0 to"),
         (["compare", "nickel", "chrome", "-o", "{}/x.exr"], 2, "expected a name that ends in .png"),
         (["render", "nickel", "-o", "{}/x.jpg"], 2, "expected a name that ends in .png or .exr"),
-        (["render", "nickel", "-o", "{}/x.png", "--envmap", "{}/no.exr"], 1, "found no such file"),
+        (["render", "nickel", "-o", "{}/x.png", "--envmap", "{}/no.exr"], 1, "found no file"),
         (["render", "nickel", "-o", "{}/x.png", "--scene", "moon"], 2, "invalid choice: 'moon'"),
         (["compres"], 2, "invalid choice: 'compres'"),
         ([], 2, "required: COMMAND"),
@@ -275,7 +276,7 @@ def test_more_units_than_colours(capsys, tmp_path):
     planes[0, :4] = [1, 2, 3, 4]
     path = tmp_path / "few.binary"
     path.write_bytes(np.array([90, 90, 180], "<i4").tobytes() + planes.tobytes())
-    message = "few: expected at least 6 distinct colours, found 5"
+    message = "few: expected at least 6 distinct colours, one a cluster, found 5"
     check_refused(capsys, tmp_path, ["compress", path, "-o", tmp_path / "x.smrl", "--clusters", 6], 1, message)
 
 
@@ -313,6 +314,22 @@ def test_360_bins_survive_every_command(capsys, tmp_path):
     assert load(tmp_path / "b.binary").lattice == lattice
     result = run_json(capsys, "compare", tmp_path / "a.smrl", tmp_path / "b.binary", *SMALL_PICTURE)
     assert result["table_rmse"] < 1e-12
+
+
+def test_an_output_is_not_its_input(capsys, folder, tmp_path):
+    path = tmp_path / "a.smrl"
+    path.write_bytes((folder / "pearl.smrl").read_bytes())
+    check_refused(capsys, tmp_path, ["compress", path, "-o", path], 2, "expected an output other than the input")
+    check_refused(capsys, tmp_path, ["convert", path, path], 2, "expected an output other than the input")
+
+
+@pytest.mark.parametrize("flags", [["--json"], []])
+def test_output_that_nobody_reads(folder, flags):
+    process = start("info", folder / "pearl.smrl", *flags)
+    process.stdout.close()
+    assert process.wait() == 1
+    assert process.stderr.read() == ""
+    process.stderr.close()
 
 
 def test_odd_names_and_terminals(folder, tmp_path):

@@ -33,6 +33,14 @@ def test_the_longest_names_work_and_errors_speak_of_the_file_meant(tmp_path):
         assert caught.value.filename == "/proc/x.smrl"
 
 
+def test_a_link_stays_a_link(tmp_path):
+    (tmp_path / "link").symlink_to(tmp_path / "target")
+    with atomic_write(tmp_path / "link") as out:
+        out.write(b"x")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "target").read_bytes() == b"x"
+
+
 def test_what_cannot_be_written_is_said_beforehand(tmp_path):
     check_writable(tmp_path / "new")
     assert list(tmp_path.iterdir()) == []

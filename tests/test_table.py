@@ -55,7 +55,7 @@ def test_values_that_no_measurement_has_are_clamped_and_counted():
 
 def test_nothing_positive_is_refused():
     for bad in (-1.0, 0.0, np.nan):
-        with pytest.raises(MaterialError, match="expected a positive reflectance above the horizon, found none"):
+        with pytest.raises(MaterialError, match="expected a positive, finite reflectance above the horizon"):
             BrdfTable(np.full((*SMALL.shape, 3), bad), SMALL, name="dark")
 
 

@@ -30,8 +30,9 @@ class NumpyOps:
 
     @staticmethod
     def gather(buffer: Any, index: Array) -> Array:
-        """Entry `index` of a flat buffer."""
-        return buffer[index]
+        """Entry `index` of a flat buffer; an integer entry as one that can be calculated with, and does not wrap."""
+        value = buffer[index]
+        return value.astype(np.int64) if value.dtype.kind == "u" else value
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,9 @@ class Brdf(ABC):
 
     name: str
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.name!r})"
+
     def buffers(self) -> dict[str, NDArray[Any]]:
         """The flat NumPy arrays that `f_r` reads, by name; a renderer uploads them once."""
         return {}

@@ -6,6 +6,7 @@ import argparse
 import io
 import json
 import math
+import os
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
@@ -55,16 +56,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         result = options.run(options)
+        if options.json:
+            print(json.dumps(_finite(result), indent=2))
+        sys.stdout.flush()
     except OptionError as error:
         return _fail(str(error), 2)
     except SommerlError as error:
         return _fail(str(error), 1)
+    except BrokenPipeError:  # whoever read the output has had enough; nobody is left to be told
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
     except OSError as error:
-        return _fail(f"{error.filename or 'file'}: {error.strerror or error}", 1)
+        return _fail(f"{error.filename or 'output'}: {error.strerror or error}", 1)
     except MemoryError:
         return _fail("not enough memory", 1)
-    if options.json:
-        print(json.dumps(_finite(result), indent=2))
     return 0
 
 
@@ -129,7 +134,7 @@ def _compress(add: Any) -> None:
         "--preset",
         choices=["paper"],
         default="paper",
-        help="the representation: the full lattice, nearest lookup (%(default)s, the only one so far)",
+        help="full lattice, nearest lookup (%(default)s, the only one so far)",
     )
     helps = {
         "clusters": "M, the number of entries in the palette",
@@ -180,8 +185,8 @@ def _compare(add: Any) -> None:
     command.add_argument(
         "--lookup",
         choices=INTERPOLATIONS,
-        help="how tables are looked up; if not given: as the other material is, if that is one on the same lattice, "
-        "so that the figures measure the compression alone; else trilinear",
+        help="how both are looked up; if not given: a compressed material as it is, a table as the compressed one on "
+        "its lattice, so that the figures measure the compression alone, else trilinear",
     )
     _rendering(command)
 
@@ -194,7 +199,11 @@ def _render(add: Any) -> None:
     command.add_argument("material", metavar="MATERIAL")
     command.add_argument("--scene", choices=["sphere"], default="sphere", help="(%(default)s)")
     command.add_argument("-o", "--output", type=Path, required=True, help="a .png or .exr file")
-    command.add_argument("--lookup", choices=INTERPOLATIONS, help="how a table is looked up (trilinear)")
+    command.add_argument(
+        "--lookup",
+        choices=INTERPOLATIONS,
+        help="how it is looked up (tables: trilinear)",
+    )
     _rendering(command)
 
 

@@ -14,7 +14,7 @@ from .describe import compression_rows, describe, image_rows, label, text, train
 from .errors import FormatError, OptionError
 from .files import check_writable
 from .formats import merl
-from .load import load, load_table
+from .load import interpolated, load, load_table
 from .materials import NAMES, builtin_table
 from .metrics import exposure, table_metrics, to_srgb8
 from .render.compare import compare_on_sphere
@@ -55,10 +55,8 @@ def _outputs(inputs: list[str], output: Path) -> list[Path]:
         raise OptionError(f"{output}: expected a folder that exists, for several inputs")
     if len(set(outputs)) < len(outputs):
         raise OptionError("inputs: expected different names, found two that would be written to one file")
-    for path in outputs:
-        if path.suffix != ".smrl":
-            raise OptionError(f"{path}: expected a name that ends in .smrl, found {path.suffix!r}")
-        check_writable(path)
+    for source, path in zip(inputs, outputs, strict=True):
+        _check_output(path, (".smrl",), source)
     return outputs
 
 
@@ -94,11 +92,9 @@ def convert(options: Namespace) -> dict[str, Any]:
         raise OptionError(f"noise: expected a built-in material, found {options.input}")
     if options.noise is not None and options.noise < 0:
         raise OptionError(f"noise: expected a seed of at least 0, found {options.noise}")
-    check_writable(options.output)
-    if options.output.suffix not in (".binary", ".smrl"):
-        raise OptionError(f"{options.output}: expected a name that ends in .binary or .smrl")
+    _check_output(options.output, (".binary", ".smrl"), options.input)
     table = load_table(options.input) if options.noise is None else builtin_table(options.input, noise=options.noise)
-    if options.output.suffix == ".smrl":
+    if options.output.suffix.lower() == ".smrl":
         return _compress_one(table, options.output, TrainOptions(), options.json)
     merl.write(table, options.output)
     written = options.output.stat().st_size
@@ -110,7 +106,7 @@ def convert(options: Namespace) -> dict[str, Any]:
 
 def compare(options: Namespace) -> dict[str, Any]:
     if options.output:
-        _check_image(options.output, (".png",))
+        _check_output(options.output, (".png",))
     reference, candidate = _alike(load(options.reference), load(options.candidate), options.lookup)
     environment = _environment(options)
     with console.progress("rendering") as advance:
@@ -132,7 +128,8 @@ def compare(options: Namespace) -> dict[str, Any]:
     if options.output:
         result["image"] = str(options.output)
     if not options.json:
-        rows = {"reference": result["reference"], "candidate": result["candidate"]} | image_rows(comparison.metrics)
+        lookups = [getattr(brdf, "interpolation", "formula") for brdf in (reference, candidate)]
+        rows = {"lookup": " against ".join(dict.fromkeys(lookups))} | image_rows(comparison.metrics)
         rows |= {
             "table: RMSE [1/sr]": f"{metrics.rmse:.3g}",
             "table: log error, cosine-weighted": f"{metrics.log_error_cosine:.4f}",
@@ -143,17 +140,17 @@ def compare(options: Namespace) -> dict[str, Any]:
 
 
 def render(options: Namespace) -> dict[str, Any]:
-    _check_image(options.output, (".png", ".exr"))
+    _check_output(options.output, (".png", ".exr"))
     brdf = load(options.material)
-    if isinstance(brdf, BrdfTable) and options.lookup:
-        brdf = brdf.with_interpolation(options.lookup)
+    if options.lookup:
+        brdf = interpolated(brdf, options.lookup)
     environment = _environment(options)
     started = time.perf_counter()
     with console.progress("rendering") as advance:
         scene = sphere(brdf, environment, size=options.size)
         image = render_scene(scene, spp=options.spp, seed=options.seed, progress=advance)
     seconds = time.perf_counter() - started
-    linear = options.output.suffix == ".exr"
+    linear = options.output.suffix.lower() == ".exr"
     pixels = image.pixels if linear else to_srgb8(image.pixels * exposure(image.pixels, image.mask))
     write_image(options.output, pixels)
     if not options.json:
@@ -168,14 +165,12 @@ def render(options: Namespace) -> dict[str, Any]:
 
 
 def _alike(reference: Brdf, candidate: Brdf, lookup: Any) -> tuple[Brdf, Brdf]:
-    """Both as they are compared: a table is looked up as asked, or as a SOM-MAN material on its lattice is."""
+    """Both, looked up as asked; else a table as the SOM-MAN material on its lattice, so that like meets like."""
 
     def adapted(brdf: Brdf, other: Brdf) -> Brdf:
-        if not isinstance(brdf, BrdfTable):
-            return brdf
         if lookup:
-            return brdf.with_interpolation(lookup)
-        if isinstance(other, SomManBrdf) and other.lattice == brdf.lattice:
+            return interpolated(brdf, lookup)
+        if isinstance(brdf, BrdfTable) and isinstance(other, SomManBrdf) and other.lattice == brdf.lattice:
             return brdf.with_interpolation(other.interpolation)
         return brdf
 
@@ -189,9 +184,12 @@ def _sampled(reference: Brdf, candidate: Brdf) -> tuple[BrdfTable, BrdfTable]:
     return first, second
 
 
-def _check_image(path: Path, extensions: tuple[str, ...]) -> None:
-    if path.suffix not in extensions:
+def _check_output(path: Path, extensions: tuple[str, ...], source: str = "") -> None:
+    """Says before long work what would go wrong after it."""
+    if path.suffix.lower() not in extensions:
         raise OptionError(f"{path}: expected a name that ends in {' or '.join(extensions)}, found {path.suffix!r}")
+    if source and path.exists() and Path(source).exists() and path.samefile(source):
+        raise OptionError(f"{path}: expected an output other than the input")
     check_writable(path)
 
 
@@ -201,5 +199,5 @@ def _environment(options: Namespace) -> Any:
         if not low <= getattr(options, name) <= high:
             raise OptionError(f"{name}: expected {low} to {high}, found {getattr(options, name)}")
     if options.envmap and not options.envmap.is_file():
-        raise FormatError(f"{options.envmap}: expected an environment image, found no such file")
+        raise FormatError(f"{options.envmap}: expected an environment image, found no file")
     return load_environment(options.envmap) if options.envmap else default_environment()

@@ -20,7 +20,7 @@ def trained(table: BrdfTable, options: TrainOptions) -> tuple[SomManBrdf, TrainR
     """Trains under a progress bar, and measures the result."""
     with console.progress(f"training {table.name}") as advance:
         material, report = train(table, options, progress=advance)
-    metrics = table_metrics(table.values, material.values(), table.lattice)
+    metrics = table_metrics(table.values, material.values, table.lattice)
     measured = asdict(metrics) | {"quantisation_error": report.quantisation_error[-1]}
     material.metrics = {name: float(f"{value:.{METRICS_DIGITS}g}") for name, value in measured.items()}
     return material, report
@@ -62,7 +62,7 @@ def compression_rows(material: SomManBrdf, bytes_disk: int, report: TrainReport)
     rows = {
         "clusters": f"{material.clusters}{dropped}",
         "epochs": str(len(report.quantisation_error)),
-        "quantisation error, last epoch": f"{report.quantisation_error[-1]:.3g}",
+        "quantisation error, last epoch, of the largest value": f"{report.quantisation_error[-1]:.3g}",
         "table: RMSE [1/sr]": f"{material.metrics['rmse']:.3g}",
         "table: log error, cosine-weighted": f"{material.metrics['log_error_cosine']:.4f}",
         "table: relative error": f"{material.metrics['relative_error']:.3g}",

@@ -17,6 +17,7 @@ def atomic_write(path: Path) -> Generator[BinaryIO]:
 
     Raises OSError if it cannot be written; whatever had that name before is then still there.
     """
+    path = Path(os.path.realpath(path))  # a link stays a link
     with _named(path):
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".sommerl-")
     try:

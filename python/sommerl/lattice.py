@@ -89,8 +89,9 @@ class Lattice:
     def extended(self, values: NDArray[Any]) -> NDArray[Any]:
         """`values`, of the lattice's shape (…), with every cell below the horizon set to the last one above it in θ_d.
 
-        Where a coarse lattice has none in θ_d, it is the last in θ_h that has. A pair of directions just above the horizon may fall into a cell whose centre is below it, or have such
-        a cell as a neighbour when interpolating.
+        Where a coarse lattice has none in θ_d, it is the last in θ_h that has.
+        A pair of directions just above the horizon may fall into a cell whose centre is below it, or have such a cell
+        as a neighbour when interpolating.
         """
         h, d, p = np.ogrid[: self.theta_h, : self.theta_d, : self.phi_d]
         h = np.minimum(h, self.above_horizon[:, :1].sum(axis=0, keepdims=True) - 1)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from .brdf import Brdf
-from .errors import FormatError
+from .errors import FormatError, MaterialError
 from .formats import merl
+from .lattice import Interpolation
 from .materials import NAMES, builtin
 from .som_man import file as smrl
 from .som_man.material import SomManBrdf
@@ -43,9 +44,13 @@ def load(source: str | Path) -> Brdf:
     raise FormatError(f"{path}: expected a MERL table (.binary) or a Sommerl material (.smrl), found neither")
 
 
+def interpolated(brdf: Brdf, interpolation: Interpolation) -> Brdf:
+    """The same material, looked up in another way. Raises MaterialError if it is a formula, or there is no such way."""
+    if isinstance(brdf, BrdfTable | SomManBrdf):
+        return brdf.with_interpolation(interpolation)
+    raise MaterialError(f"{brdf.name}: expected a table or a compressed material to look up, found a formula")
+
+
 def load_table(source: str | Path) -> BrdfTable:
     """The material as a table on its own lattice; a formula is evaluated at the cell centres of MERL's."""
-    brdf = load(source)
-    if isinstance(brdf, SomManBrdf):
-        return BrdfTable(brdf.values(), brdf.lattice, name=brdf.name, source_sha256=brdf.source_sha256)
-    return brdf if isinstance(brdf, BrdfTable) else BrdfTable.sample(brdf)
+    return BrdfTable.of(load(source))

@@ -84,7 +84,7 @@ def exposure(reference: Pixels, mask: Mask) -> float:
     """The factor that brings the 90th percentile of the object's pixels' mean channel to 0.6."""
     level = float(np.percentile(reference[mask].mean(axis=-1), EXPOSURE_PERCENTILE)) if mask.any() else 0.0
     if not (np.isfinite(level) and level > 0):
-        raise MaterialError("exposure: expected an object that reflects light, found none in the reference image")
+        raise MaterialError("exposure: expected an object that reflects light, found a black one")
     return EXPOSED_TO / level
 
 

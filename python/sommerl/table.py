@@ -39,14 +39,15 @@ class BrdfTable(Brdf):
     ) -> None:
         f_r = np.array(values, np.float64)
         if f_r.shape != (*lattice.shape, 3):
-            raise MaterialError(f"{name}: expected values of shape {(*lattice.shape, 3)}, found {f_r.shape}")
-        unusable = (~np.isfinite(f_r) | (f_r < 0)) & lattice.above_horizon[..., None]
+            raise MaterialError(f"expected values of shape {(*lattice.shape, 3)}, found {f_r.shape}")
+        # Not true, either, of NaN. Renderers calculate in single precision.
+        unusable = ~((f_r >= 0) & (f_r <= np.finfo(np.float32).max)) & lattice.above_horizon[..., None]
         f_r[unusable] = 0.0
         if not (f_r[lattice.above_horizon] > 0).any():
-            raise MaterialError(f"{name}: expected a positive reflectance above the horizon, found none")
+            raise MaterialError("expected a positive, finite reflectance above the horizon, found none")
         self.name = name
         self.lattice = lattice
-        self.interpolation = checked(interpolation)
+        self.interpolation: Interpolation = checked(interpolation)
         self.cells_clamped = int(unusable.any(axis=-1).sum())
         self.values: NDArray[np.float64] = lattice.extended(f_r)
         self.source_sha256 = source_sha256 or hashlib.sha256(self.values.astype("<f8").tobytes()).hexdigest()
@@ -59,6 +60,15 @@ class BrdfTable(Brdf):
         values = np.zeros((*lattice.shape, 3))
         values[above] = brdf.eval(np.stack(wi, -1), np.stack(wo, -1))
         return cls(values, lattice, name=brdf.name)
+
+    @classmethod
+    def of(cls, brdf: Brdf) -> BrdfTable:
+        """The BRDF itself if it is a table; else the table of its cells, or at MERL's cell centres if it has none."""
+        if isinstance(brdf, BrdfTable):
+            return brdf
+        table = cls.sample(brdf, getattr(brdf, "lattice", MERL))
+        table.source_sha256 = getattr(brdf, "source_sha256", table.source_sha256)
+        return table
 
     def with_interpolation(self, interpolation: Interpolation) -> BrdfTable:
         """The same cells, looked up in another way."""

@@ -8,6 +8,7 @@ from helpers import must_fail, random_directions
 
 from sommerl import BrdfTable, Lattice, TrainOptions, builtin, save, train
 from sommerl.arrays import Packed16, gather3, ops
+from sommerl.errors import MaterialError
 from sommerl.render.bsdf import make_bsdf, register, upload
 from sommerl.render.llvm import drjit, mitsuba
 from sommerl.sampling import BlinnPhongSampler
@@ -46,7 +47,7 @@ PAIRS = random_directions(20_000, 1), random_directions(20_000, 2)
 
 
 @pytest.mark.parametrize("interpolation", ["nearest", "trilinear"])
-@pytest.mark.parametrize("clusters", [60, 700])
+@pytest.mark.parametrize("clusters", [60, 256, 700])
 def test_som_man_material_is_the_same_in_mitsuba(interpolation, clusters):
     material, _ = train(table("pearl-paint"), TrainOptions(clusters=clusters, epochs=2))
     material.interpolation = interpolation
@@ -158,6 +159,12 @@ def test_scene_files_can_name_a_material(tmp_path):
         check_agrees_with_numpy(material, np.array(value).T / PAIRS[0][:, 2:])
 
 
+def test_scene_files_can_choose_the_interpolation():
+    register()
+    with pytest.raises(MaterialError, match="found a formula"):
+        mi.load_dict({"type": "sommerl", "filename": "nickel", "interpolation": "nearest"})
+
+
 def test_paths_in_a_scene_file_may_be_relative_to_it(tmp_path):
     material, _ = train(table("nickel"), TrainOptions(clusters=4, epochs=1))
     save(material, tmp_path / "only_here.smrl")
@@ -172,6 +179,7 @@ def test_a_variant_that_is_set_stays_and_only_rgb_will_do():
     code = """
 import mitsuba as mi
 from sommerl.errors import SommerlError
+from sommerl.errors import MaterialError
 from sommerl.render.bsdf import register
 mi.set_variant("scalar_rgb")
 register()
@@ -185,7 +193,7 @@ except SommerlError as error:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     first, second = done.stdout.splitlines()
     assert first == "scalar_rgb SommerlBsdf[nickel (SGD stand-in)]"
-    assert second == "Mitsuba's variant: expected one of RGB, such as llvm_ad_rgb, found scalar_spectral"
+    assert second == "Mitsuba's variant: expected one of RGB, like llvm_ad_rgb, found scalar_spectral"
 
 
 def test_scalar_mode_warns_and_gives_the_same():

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import FormatError
+from ..errors import FormatError, MaterialError
 from ..files import atomic_write
 from ..lattice import Lattice
 from ..table import BrdfTable
@@ -50,7 +50,10 @@ def read(path: str | Path) -> BrdfTable:
     data = path.read_bytes()
     planes = np.frombuffer(data, "<f8", offset=HEADER_BYTES).reshape(3, *lattice.shape)
     values = np.moveaxis(planes, 0, -1) * SCALE
-    return BrdfTable(values, lattice, name=_printable(path.stem), source_sha256=hashlib.sha256(data).hexdigest())
+    try:
+        return BrdfTable(values, lattice, name=_printable(path.stem), source_sha256=hashlib.sha256(data).hexdigest())
+    except MaterialError as error:
+        raise MaterialError(f"{path}: {error}") from error
 
 
 def bytes_on_disk(lattice: Lattice) -> int:

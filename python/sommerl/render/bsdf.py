@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Packed16
 from ..brdf import Brdf
-from ..load import load
+from ..load import interpolated, load
 from ..sampling import BlinnPhongSampler
 from .llvm import drjit, mitsuba
 
@@ -28,7 +28,8 @@ def make_bsdf(brdf: Brdf, sampler: BlinnPhongSampler | None = None) -> Any:
 def register() -> None:
     """Makes the plug-in `sommerl` known to scenes in Mitsuba's present variant, as Mitsuba's own Python plug-ins are.
 
-    Its property `filename` is a built-in's name, or a path, which may be relative to the scene file.
+    Properties: `filename`, a built-in's name or a path, which may be relative to the scene file; `interpolation`,
+    nearest or trilinear, if it is not to be the material's own.
     """
     mitsuba().register_bsdf("sommerl", _from_properties)
 
@@ -37,6 +38,8 @@ def _from_properties(props: Any) -> Any:
     name = str(props["filename"])
     found = str(mitsuba().file_resolver().resolve(name))
     brdf = load(found if Path(found).is_file() else name)
+    if props.has_property("interpolation"):
+        brdf = interpolated(brdf, props["interpolation"])
     return _plugin()(props, brdf, BlinnPhongSampler.fitted(brdf))
 
 

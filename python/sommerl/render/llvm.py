@@ -27,8 +27,8 @@ PATH_VARIABLE = "DRJIT_LIBLLVM_PATH"
 
 
 def mitsuba() -> Any:
-    """The module `mitsuba` with a variant set: the one that is set already; else CUDA if there is a GPU, else LLVM, else
-    scalar with a warning.
+    """The module `mitsuba` with a variant set: the one that is set already, or CUDA if there is a GPU, else LLVM, else
+    scalar, with a warning.
 
     Raises MissingDependencyError if Mitsuba is not installed, or the variant that is set is not one of RGB.
     """
@@ -36,9 +36,7 @@ def mitsuba() -> Any:
     if mi.variant() is None:
         mi.set_variant(_variant(mi))
     if not mi.variant().endswith("rgb"):
-        raise MissingDependencyError(
-            f"Mitsuba's variant: expected one of RGB, such as llvm_ad_rgb, found {mi.variant()}"
-        )
+        raise MissingDependencyError(f"Mitsuba's variant: expected one of RGB, like llvm_ad_rgb, found {mi.variant()}")
     return mi
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,7 @@ class SomManBrdf(Brdf):
             raise MaterialError(f"{name}: expected indices below {len(self.lut)}, found {index.max()}")
         self.name = name
         self.lattice = lattice
-        self.interpolation = checked(interpolation)
+        self.interpolation: Interpolation = checked(interpolation)
         self.options = dict(options or {})
         self.metrics = dict(metrics or {})
         self.source_sha256 = source_sha256
@@ -58,6 +59,12 @@ class SomManBrdf(Brdf):
     def index(self) -> NDArray[Any]:
         """The LUT entry of each cell, of the lattice's shape, uint8 or uint16; 0 below the horizon."""
         return np.where(self.lattice.above_horizon, self._index, self._index.dtype.type(0))
+
+    def with_interpolation(self, interpolation: Interpolation) -> SomManBrdf:
+        """The same cells, looked up in another way."""
+        other = copy(self)
+        other.interpolation = checked(interpolation)
+        return other
 
     @property
     def clusters(self) -> int:
@@ -74,6 +81,7 @@ class SomManBrdf(Brdf):
         """What index and LUT take in memory."""
         return self._index.nbytes + self.lut.nbytes
 
+    @property
     def values(self) -> NDArray[np.float64]:
         """f_r [1/sr] of each cell, of the lattice's shape + (3,)."""
         return self.lut[self._index]

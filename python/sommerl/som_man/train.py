@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..brdf import Brdf
 from ..errors import MaterialError
 from ..table import BrdfTable
 from .material import SomManBrdf
@@ -42,15 +43,16 @@ class TrainReport:
 
 
 def train(
-    table: BrdfTable, options: TrainOptions | None = None, *, progress: Progress | None = None, kernels: Any = _core
+    source: Brdf, options: TrainOptions | None = None, *, progress: Progress | None = None, kernels: Any = _core
 ) -> tuple[SomManBrdf, TrainReport]:
-    """Compresses a table: the material, and a report.
+    """Compresses a table, or any other BRDF as `BrdfTable.of` samples it: the material, and a report.
 
     The result depends on the table and the options alone. kernels: `sommerl._core`, or `som_man.reference`, which gives
     the same bits slowly. Raises MaterialError if the table has fewer distinct colours than `options.clusters`.
     """
     options = options or TrainOptions()
     started = time.perf_counter()
+    table = BrdfTable.of(source)
     above = table.lattice.above_horizon
     rgb = table.values[above]
     x = (rgb / rgb.max()).astype(np.float32)
@@ -87,7 +89,9 @@ def _start(x: NDArray[np.float32], options: TrainOptions, name: str) -> tuple[ND
         if len(first) >= options.clusters:
             return order.astype(np.uint32), drawn[np.sort(first)[: options.clusters]]
         if taken >= len(drawn):
-            raise MaterialError(f"{name}: expected at least {options.clusters} distinct colours, found {len(first)}")
+            raise MaterialError(
+                f"{name}: expected at least {options.clusters} distinct colours, one a cluster, found {len(first)}"
+            )
         taken *= 4
 
 
