@@ -38,7 +38,7 @@ def _from_properties(props: Any) -> Any:
     name = str(props["filename"])
     found = str(mitsuba().file_resolver().resolve(name))
     brdf = load(found if Path(found).is_file() else name)
-    if props.has_property("interpolation"):
+    if "interpolation" in props:
         brdf = interpolated(brdf, props["interpolation"])
     return _plugin()(props, brdf, BlinnPhongSampler.fitted(brdf))
 
