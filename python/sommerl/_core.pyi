@@ -10,24 +10,35 @@ STORED: int
 EMPTY: int
 """The cell number of a storage slot that holds nothing."""
 
+def simd_paths() -> list[Literal["portable", "avx2", "avx512"]]:
+    """The instruction sets that this processor has and the core is compiled for; the last one is used."""
+
 class Learner:
     """Units of the SOM and their MANs, in training (phases 1 and 2)."""
 
     def __init__(
         self,
         triples: NDArray[np.float32],
+        cells: NDArray[np.uint32],
         weights: NDArray[np.float32],
         rule: Literal["paper", "kohonen"],
         columns: int,
+        search: Literal["boxes", "all", "scalar"] = "boxes",
+        simd: str | None = None,
     ) -> None:
-        """triples (n, 3): what the cells hold, in [0, 1]; weights (M, 3): the units' first weights;
-        columns: units in a row of the sheet."""
+        """triples (n, 3): what the cells hold, in [0, 1], in the order of presentation; cells (n,): their numbers;
+        weights (M, 3): the units' first weights; columns: units in a row of the sheet. search and simd change nothing
+        but the time.
+        """
 
-    def present(self, cells: NDArray[np.uint32], alpha: float, falloff: NDArray[np.float32]) -> float:
-        """Presents cells in order; returns the sum of their distances to their winners' weights.
+    def present(self, start: int, stop: int, alpha: float, falloff: NDArray[np.float32]) -> float:
+        """Presents a range of the order; returns the sum of the distances to the winners' weights.
 
         falloff: learning weight by distance along a row or a column of the sheet; [1] moves the winner alone.
         """
+
+    def settled(self) -> bool:
+        """To be asked at the end of each epoch: whether it left everything as it was. Then so will every later one."""
 
     def weights(self) -> NDArray[np.float32]:
         """(M, 3)."""
@@ -35,5 +46,17 @@ class Learner:
     def stored_cells(self) -> NDArray[np.uint32]:
         """(M, STORED): the cells whose triples each unit stores; EMPTY where it stores none."""
 
-def query(triples: NDArray[np.float32], lut: NDArray[np.float32]) -> NDArray[np.uint32]:
-    """The nearest entry of lut (M, 3), the lowest one of several, for each of triples (n, 3): phase 3."""
+class Palette:
+    """The LUT, asked for the nearest of its entries (phase 3)."""
+
+    def __init__(
+        self,
+        lut: NDArray[np.float32],
+        search: Literal["boxes", "all"] = "boxes",
+        simd: str | None = None,
+        threads: int | None = None,
+    ) -> None:
+        """lut: (M, 3). threads: as many as there are processors, if None."""
+
+    def query(self, triples: NDArray[np.float32]) -> NDArray[np.uint32]:
+        """The nearest entry, the lowest one of several, for each of triples (n, 3)."""

@@ -1,11 +1,15 @@
 //! Python bindings of the hot loops. The contracts are in `python/sommerl/_core.pyi`.
 
 mod nearest;
+mod query;
+mod simd;
 mod train;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+
+use simd::Path;
 
 type Triples<'py> = PyReadonlyArray2<'py, f32>;
 
@@ -21,63 +25,111 @@ fn matrix<'py, T: numpy::Element + Copy>(py: Python<'py>, rows: Vec<[T; 3]>) -> 
     rows.as_flattened().to_pyarray(py).reshape([rows.len(), 3])
 }
 
-#[pyclass(subclass)]
-struct Learner {
-    inner: train::Learner,
-    rule: train::Rule,
-    columns: usize,
+fn path_named(name: Option<&str>) -> PyResult<Path> {
+    let available = Path::available();
+    let chosen = match name {
+        None => available.last(),
+        Some(name) => available.iter().find(|(known, _)| *known == name),
+    };
+    chosen.map(|&(_, path)| path).ok_or_else(|| {
+        let known: Vec<_> = available.iter().map(|&(name, _)| name).collect();
+        PyValueError::new_err(format!("simd: expected one of {}, found {}", known.join(", "), name.unwrap_or("none")))
+    })
 }
+
+#[pyclass(subclass)]
+struct Learner(train::Learner);
 
 #[pymethods]
 impl Learner {
     #[new]
-    fn new(triples: Triples, weights: Triples, rule: &str, columns: usize) -> PyResult<Self> {
+    #[pyo3(signature = (triples, cells, weights, rule, columns, search = "boxes", simd = None))]
+    fn new(
+        triples: Triples,
+        cells: PyReadonlyArray1<u32>,
+        weights: Triples,
+        rule: &str,
+        columns: usize,
+        search: &str,
+        simd: Option<&str>,
+    ) -> PyResult<Self> {
         let (triples, weights) = (triples_of(&triples, "triples")?, triples_of(&weights, "weights")?);
-        let rule = match rule {
+        let cells = cells.as_slice()?.to_vec();
+        if weights.is_empty() || columns == 0 || cells.len() != triples.len() {
+            return Err(PyValueError::new_err("expected at least one unit and column, and as many cells as triples"));
+        }
+        let mut learner = train::Learner::new(triples, cells, &weights);
+        learner.columns = columns;
+        learner.path = path_named(simd)?;
+        learner.rule = match rule {
             "paper" => train::Rule::Paper,
             "kohonen" => train::Rule::Kohonen,
             _ => return Err(PyValueError::new_err(format!("rule: expected paper or kohonen, found {rule}"))),
         };
-        if weights.is_empty() || columns == 0 || triples.len() >= train::EMPTY as usize {
-            return Err(PyValueError::new_err(
-                "expected at least one unit and column, and fewer than 2^32 - 1 triples",
-            ));
-        }
-        Ok(Learner { inner: train::Learner::new(triples, &weights), rule, columns })
+        learner.search = match search {
+            "boxes" => train::Search::Boxes,
+            "all" => train::Search::All,
+            "scalar" => train::Search::Scalar,
+            _ => return Err(PyValueError::new_err(format!("search: expected boxes, all or scalar, found {search}"))),
+        };
+        Ok(Learner(learner))
     }
 
     fn present(
         &mut self,
         py: Python,
-        cells: PyReadonlyArray1<u32>,
+        start: usize,
+        stop: usize,
         alpha: f32,
         falloff: PyReadonlyArray1<f32>,
     ) -> PyResult<f64> {
-        let (cells, falloff) = (cells.as_slice()?, falloff.as_slice()?);
-        if falloff.is_empty() || cells.iter().any(|&cell| cell as usize >= self.inner.cells()) {
-            return Err(PyValueError::new_err("expected a falloff, and cells within the triples"));
+        let falloff = falloff.as_slice()?;
+        if falloff.is_empty() || start > stop || stop > self.0.len() {
+            return Err(PyValueError::new_err("expected a falloff, and a range within the triples"));
         }
-        let epoch = train::Epoch { rule: self.rule, alpha, falloff, columns: self.columns };
-        let learner = &mut self.inner;
-        Ok(py.detach(|| learner.present(cells, &epoch)))
+        let epoch = train::Epoch { alpha, falloff };
+        let learner = &mut self.0;
+        Ok(py.detach(|| learner.present(start..stop, &epoch)))
+    }
+
+    fn settled(&mut self) -> bool {
+        self.0.settled()
     }
 
     fn weights<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        matrix(py, self.inner.weights())
+        matrix(py, self.0.weights())
     }
 
     fn stored_cells<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        matrix(py, self.inner.stored_cells())
+        matrix(py, self.0.stored_cells())
+    }
+}
+
+#[pyclass(subclass)]
+struct Palette(query::Palette);
+
+#[pymethods]
+impl Palette {
+    #[new]
+    #[pyo3(signature = (lut, search = "boxes", simd = None, threads = None))]
+    fn new(lut: Triples, search: &str, simd: Option<&str>, threads: Option<usize>) -> PyResult<Self> {
+        let lut = triples_of(&lut, "lut")?;
+        if lut.is_empty() || !["boxes", "all"].contains(&search) {
+            return Err(PyValueError::new_err("lut: expected at least one entry, and a search in boxes or all"));
+        }
+        let threads = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()));
+        Ok(Palette(query::Palette::new(&lut, search == "boxes", path_named(simd)?, threads)))
+    }
+
+    fn query<'py>(&self, py: Python<'py>, triples: Triples<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
+        let triples = triples_of(&triples, "triples")?;
+        Ok(py.detach(|| self.0.query(&triples)).to_pyarray(py))
     }
 }
 
 #[pyfunction]
-fn query<'py>(py: Python<'py>, triples: Triples<'py>, lut: Triples<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
-    let (triples, lut) = (triples_of(&triples, "triples")?, triples_of(&lut, "lut")?);
-    if lut.is_empty() {
-        return Err(PyValueError::new_err("lut: expected at least one entry, found none"));
-    }
-    Ok(py.detach(|| nearest::Codebook::new(&lut).query(&triples)).to_pyarray(py))
+fn simd_paths() -> Vec<&'static str> {
+    Path::available().into_iter().map(|(name, _)| name).collect()
 }
 
 #[pymodule]
@@ -85,5 +137,6 @@ fn _core(module: &Bound<PyModule>) -> PyResult<()> {
     module.add("STORED", train::STORED)?;
     module.add("EMPTY", train::EMPTY)?;
     module.add_class::<Learner>()?;
-    module.add_function(wrap_pyfunction!(query, module)?)
+    module.add_class::<Palette>()?;
+    module.add_function(wrap_pyfunction!(simd_paths, module)?)
 }

@@ -4,16 +4,19 @@
 //! bit for bit, as in `python/sommerl/som_man/reference.py`.
 
 use crate::nearest::{Codebook, squared_distance};
+use crate::simd::{Path, Portable, Simd};
 
 /// Stored originals of a unit (the paper's k).
 pub const STORED: usize = 3;
 /// The cell number of a storage slot that holds nothing yet.
 pub const EMPTY: u32 = u32::MAX;
 
-#[derive(Clone, Copy)]
-struct Original {
-    x: [f32; 3],
-    cell: u32,
+/// The stored originals of one unit. Lane 3 is for the triple that is being presented.
+#[derive(Clone, Copy, PartialEq)]
+#[repr(C, align(64))]
+struct Originals {
+    x: [[f32; 4]; 3],
+    cell: [u32; 4],
 }
 
 /// Learning rule for the weights: Eq. 2 with its factor x (`paper`) or without it (`kohonen`).
@@ -23,29 +26,65 @@ pub enum Rule {
     Kohonen,
 }
 
+/// How the winner is found. The result is the same.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Search {
+    /// In the boxes that may hold it, starting from the last epoch's winner.
+    Boxes,
+    /// Among all units: the peer that the former is measured against, and what is best when all units move.
+    All,
+    /// Among all units, one by one: what a textbook does.
+    Scalar,
+}
+
 /// Everything that stays the same during one epoch.
 pub struct Epoch<'a> {
-    pub rule: Rule,
     pub alpha: f32,
     /// Gaussian weights by distance along an axis of the sheet; a single 1 means that only the winner learns.
     pub falloff: &'a [f32],
-    /// Units in a row of the sheet; a chain is a sheet of one row.
-    pub columns: usize,
 }
 
 pub struct Learner {
+    /// What the cells hold, and their numbers, in the order of presentation.
     triples: Vec<[f32; 3]>,
+    cells: Vec<u32>,
+    /// The winner of each in the last epoch; at first, EMPTY.
+    winners: Vec<u32>,
+    /// In the first epoch, the last winner of a similar triple.
+    similar: Vec<u32>,
     weights: Codebook,
-    stored: Vec<[Original; STORED]>,
+    stored: Vec<Originals>,
+    /// Whether any weight has changed in this epoch, and what was stored before it.
+    moved: bool,
+    before: Vec<Originals>,
+    pub rule: Rule,
+    /// Units in a row of the sheet; a chain is a sheet of one row.
+    pub columns: usize,
+    pub path: Path,
+    pub search: Search,
 }
 
 impl Learner {
-    pub fn new(triples: Vec<[f32; 3]>, weights: &[[f32; 3]]) -> Self {
-        let nothing = Original { x: [0.0; 3], cell: EMPTY };
-        Learner { triples, weights: Codebook::new(weights), stored: vec![[nothing; STORED]; weights.len()] }
+    pub fn new(triples: Vec<[f32; 3]>, cells: Vec<u32>, weights: &[[f32; 3]]) -> Self {
+        let nothing = Originals { x: [[f32::INFINITY; 4]; 3], cell: [EMPTY; 4] };
+        let stored = vec![nothing; weights.len()];
+        Learner {
+            winners: vec![EMPTY; triples.len()],
+            similar: vec![0; 1 << SIMILAR_BITS],
+            triples,
+            cells,
+            weights: Codebook::new(weights),
+            before: stored.clone(),
+            stored,
+            moved: false,
+            rule: Rule::Kohonen,
+            columns: weights.len(),
+            path: Path::available().last().map_or(Path::Portable, |&(_, path)| path),
+            search: Search::Boxes,
+        }
     }
 
-    pub fn cells(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.triples.len()
     }
 
@@ -55,86 +94,229 @@ impl Learner {
 
     /// Cell numbers of each unit's stored originals, slot by slot; `EMPTY` where a slot holds nothing.
     pub fn stored_cells(&self) -> Vec<[u32; STORED]> {
-        self.stored.iter().map(|unit| unit.map(|original| original.cell)).collect()
+        self.stored.iter().map(|unit| [unit.cell[0], unit.cell[1], unit.cell[2]]).collect()
     }
 
-    /// Presents the given cells in order. Returns the sum of the distances to their winners.
-    pub fn present(&mut self, cells: &[u32], epoch: &Epoch) -> f64 {
-        #[cfg(target_arch = "x86_64")]
-        if std::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has the one feature that the function is compiled for.
-            return unsafe { self.present_avx2(cells, epoch) };
+    /// Whether the epoch that ends here left everything as it was. Then so will every later one: with a smaller α each step is
+    /// smaller, and a step that was rounded away stays so.
+    pub fn settled(&mut self) -> bool {
+        let settled = !self.moved && self.stored == self.before;
+        self.moved = false;
+        self.before.copy_from_slice(&self.stored);
+        settled
+    }
+
+    /// Presents a range of the order. Returns the sum of the distances to the winners' weights.
+    pub fn present(&mut self, range: std::ops::Range<usize>, epoch: &Epoch) -> f64 {
+        if self.search == Search::Boxes && epoch.falloff.len() == 1 {
+            self.weights.rearrange();
         }
-        self.present_all(cells, epoch)
+        // SAFETY: a path is only ever one that this processor has.
+        unsafe {
+            match self.path {
+                Path::Portable => self.present_all::<Portable>(range, epoch),
+                #[cfg(target_arch = "x86_64")]
+                Path::Avx2 => self.present_avx2(range, epoch),
+                #[cfg(target_arch = "x86_64")]
+                Path::Avx512 => self.present_avx512(range, epoch),
+            }
+        }
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn present_avx2(&mut self, cells: &[u32], epoch: &Epoch) -> f64 {
-        self.present_all(cells, epoch)
+    unsafe fn present_avx2(&mut self, range: std::ops::Range<usize>, epoch: &Epoch) -> f64 {
+        unsafe { self.present_all::<crate::simd::Avx2>(range, epoch) }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f")]
+    unsafe fn present_avx512(&mut self, range: std::ops::Range<usize>, epoch: &Epoch) -> f64 {
+        unsafe { self.present_all::<crate::simd::Avx512>(range, epoch) }
     }
 
     #[inline(always)]
-    fn present_all(&mut self, cells: &[u32], epoch: &Epoch) -> f64 {
-        let mut distance = 0.0;
-        for &cell in cells {
-            let x = self.triples[cell as usize];
-            let (winner, squared) = self.weights.nearest(x);
-            distance += f64::from(squared).sqrt();
-            self.learn(winner, x, epoch);
-            self.attract(winner, x, cell, epoch);
+    unsafe fn present_all<S: Simd>(&mut self, range: std::ops::Range<usize>, epoch: &Epoch) -> f64 {
+        unsafe {
+            match (self.rule, epoch.falloff.len()) {
+                (Rule::Paper, 1) => self.present_each::<S, true, false>(range, epoch),
+                (Rule::Paper, _) => self.present_each::<S, true, true>(range, epoch),
+                (Rule::Kohonen, 1) => self.present_each::<S, false, false>(range, epoch),
+                (Rule::Kohonen, _) => self.present_each::<S, false, true>(range, epoch),
+            }
         }
-        distance
     }
 
-    /// Phase 1: Eq. 2 for the winner and, more weakly, for its neighbours on the sheet.
     #[inline(always)]
-    fn learn(&mut self, winner: usize, x: [f32; 3], epoch: &Epoch) {
-        self.weights.set(winner, moved(self.weights.get(winner), x, epoch.alpha, epoch.rule));
+    unsafe fn present_each<S: Simd, const PAPER: bool, const NEIGHBOURS: bool>(
+        &mut self,
+        range: std::ops::Range<usize>,
+        epoch: &Epoch,
+    ) -> f64 {
+        let mut total = 0.0;
+        let mut watch = Watch::default();
+        for k in range {
+            if !NEIGHBOURS && watch.loose() {
+                self.weights.rearrange();
+            }
+            let x = self.triples[k];
+            let (winner, squared) = match self.search {
+                Search::Boxes if !NEIGHBOURS => unsafe { self.winner::<S>(k, x, &mut watch) },
+                Search::Scalar => one_by_one(&self.weights, x),
+                _ => unsafe { self.weights.nearest_of_all::<S>(x) },
+            };
+            total += f64::from(squared).sqrt();
+            let old = self.weights.get(winner);
+            let learnt = moved::<PAPER>(old, x, epoch.alpha);
+            if NEIGHBOURS {
+                self.move_neighbours::<PAPER>(winner, x, epoch);
+            }
+            let weight = attract::<PAPER>(&mut self.stored[winner], learnt, x, self.cells[k], epoch.alpha);
+            // Two steps that cancel are no rest: smaller ones need not cancel.
+            self.moved |= (learnt != old) | (weight != learnt);
+            self.weights.set(winner, weight);
+        }
+        total
+    }
+
+    /// The winner of presentation k, searched for from where it is likely to be: the winner of the same cell in the last epoch; or,
+    /// where units move so far that they take over others' cells, the nearest of that, of the last winner of a similar
+    /// triple, and of the last winner of all.
+    #[inline(always)]
+    unsafe fn winner<S: Simd>(&mut self, k: usize, x: [f32; 3], watch: &mut Watch) -> (usize, f32) {
+        let mut guess = self.winners[k];
+        let unsteady = watch.unsteady || guess == EMPTY;
+        if unsteady {
+            let mut nearest = f32::INFINITY;
+            for unit in [self.winners[k], self.similar[similar_to(x)], self.winners[k.saturating_sub(1)]] {
+                if unit == EMPTY {
+                    continue;
+                }
+                let distance = squared_distance(x, self.weights.get(unit as usize));
+                if distance < nearest {
+                    (guess, nearest) = (unit, distance);
+                }
+            }
+        }
+        let found = unsafe { self.weights.nearest::<S>(x, guess as usize, &mut watch.work) };
+        watch.missed += usize::from(found.0 != self.winners[k] as usize);
+        if unsteady {
+            self.similar[similar_to(x)] = found.0 as u32;
+        }
+        self.winners[k] = found.0 as u32;
+        found
+    }
+
+    /// Phase 1 for the winner's neighbours on the sheet: Eq. 2, more weakly.
+    fn move_neighbours<const PAPER: bool>(&mut self, winner: usize, x: [f32; 3], epoch: &Epoch) {
         let reach = epoch.falloff.len() - 1;
-        if reach == 0 {
-            return;
-        }
-        let (row, column) = (winner / epoch.columns, winner % epoch.columns);
-        let rows = self.weights.len().div_ceil(epoch.columns);
+        let (row, column) = (winner / self.columns, winner % self.columns);
+        let rows = self.weights.len().div_ceil(self.columns);
         for r in row.saturating_sub(reach)..rows.min(row + reach + 1) {
-            for c in column.saturating_sub(reach)..epoch.columns.min(column + reach + 1) {
-                let unit = r * epoch.columns + c;
+            for c in column.saturating_sub(reach)..self.columns.min(column + reach + 1) {
+                let unit = r * self.columns + c;
                 if unit == winner || unit >= self.weights.len() {
                     continue;
                 }
-                let weight = epoch.falloff[r.abs_diff(row)] * epoch.falloff[c.abs_diff(column)];
-                let alpha = epoch.alpha * weight;
-                self.weights.set(unit, moved(self.weights.get(unit), x, alpha, epoch.rule));
+                let falloff = epoch.falloff[r.abs_diff(row)] * epoch.falloff[c.abs_diff(column)];
+                let old = self.weights.get(unit);
+                let weight = moved::<PAPER>(old, x, epoch.alpha * falloff);
+                self.moved |= weight != old;
+                self.weights.set(unit, weight);
             }
         }
     }
+}
 
-    /// Phase 2: Eq. 3 to 6. A slot that holds nothing counts as infinitely far away.
+/// Watches over the search, window by window of presentations.
+#[derive(Default)]
+struct Watch {
+    presented: usize,
+    /// Blocks looked into, and how many of them when the boxes were new.
+    work: usize,
+    when_new: Option<usize>,
+    /// Cells whose winner is not that of the last epoch; whether they were many in the last window.
+    missed: usize,
+    unsteady: bool,
+}
+
+impl Watch {
+    const WINDOW: usize = 1024;
+
+    /// To be asked before each presentation: whether the boxes, which grow as units move, have become so loose that new ones
+    /// are worth their time. After a yes, they count as new.
     #[inline(always)]
-    fn attract(&mut self, winner: usize, x: [f32; 3], cell: u32, epoch: &Epoch) {
-        let weight = self.weights.get(winner);
-        let stored = &mut self.stored[winner];
-        let (mut farthest, mut distance) = (0, f32::NEG_INFINITY);
-        for (slot, original) in stored.iter().enumerate() {
-            let d = if original.cell == EMPTY { f32::INFINITY } else { squared_distance(original.x, weight) };
-            if d > distance {
-                (farthest, distance) = (slot, d);
-            }
+    fn loose(&mut self) -> bool {
+        self.presented += 1;
+        if self.presented <= Self::WINDOW {
+            return false;
         }
-        if squared_distance(x, weight) <= distance {
-            stored[farthest] = Original { x, cell };
+        self.presented = 1;
+        self.unsteady = std::mem::take(&mut self.missed) > Self::WINDOW / 8;
+        let work = std::mem::take(&mut self.work);
+        let loose = work > 2 * *self.when_new.get_or_insert(work) + Self::WINDOW;
+        if loose {
+            self.when_new = None;
         }
-        let attractor = stored[farthest].x;
-        self.weights.set(winner, moved(weight, attractor, epoch.alpha, epoch.rule));
+        loose
     }
+}
+
+/// Phase 2: Eq. 3 to 6. A slot that holds nothing is infinitely far away. Returns the winner's new weight.
+#[inline(always)]
+fn attract<const PAPER: bool>(
+    stored: &mut Originals,
+    weight: [f32; 3],
+    x: [f32; 3],
+    cell: u32,
+    alpha: f32,
+) -> [f32; 3] {
+    for (lanes, value) in stored.x.iter_mut().zip(x) {
+        lanes[3] = value;
+    }
+    let distance: [f32; 4] = std::array::from_fn(|i| {
+        let [r, g, b] = std::array::from_fn(|j| stored.x[j][i] - weight[j]);
+        (r * r + g * g) + b * b
+    });
+    let mut farthest = usize::from(distance[1] > distance[0]);
+    farthest = if distance[2] > distance[farthest] { 2 } else { farthest };
+    let replaces = distance[3] <= distance[farthest];
+    let attractor: [f32; 3] = std::array::from_fn(|j| if replaces { x[j] } else { stored.x[j][farthest] });
+    if replaces {
+        for (lanes, value) in stored.x.iter_mut().zip(x) {
+            lanes[farthest] = value;
+        }
+        stored.cell[farthest] = cell;
+    }
+    moved::<PAPER>(weight, attractor, alpha)
 }
 
 /// Eq. 2 (and, with a stored original for x, Eq. 6): c + (α x) (x - c), or c + α (x - c) under Kohonen's rule.
 #[inline(always)]
-fn moved(c: [f32; 3], x: [f32; 3], alpha: f32, rule: Rule) -> [f32; 3] {
+fn moved<const PAPER: bool>(c: [f32; 3], x: [f32; 3], alpha: f32) -> [f32; 3] {
     std::array::from_fn(|j| {
-        let rate = if rule == Rule::Paper { alpha * x[j] } else { alpha };
+        let rate = if PAPER { alpha * x[j] } else { alpha };
         c[j] + rate * (x[j] - c[j])
     })
+}
+
+fn one_by_one(weights: &Codebook, x: [f32; 3]) -> (usize, f32) {
+    let mut best = (0, f32::INFINITY);
+    for unit in 0..weights.len() {
+        let d = squared_distance(x, weights.get(unit));
+        if d < best.1 {
+            best = (unit, d);
+        }
+    }
+    best
+}
+
+const SIMILAR_BITS: u32 = 14;
+
+/// A number that triples of about the same colour and brightness share: exponents and leading bits of the mantissas, hashed.
+#[inline(always)]
+fn similar_to(x: [f32; 3]) -> usize {
+    let [r, g, b] = x.map(|v| v.to_bits() >> 20);
+    let mixed = (r | (g << 11)).wrapping_mul(0x9E37_79B1) ^ b.wrapping_mul(0x85EB_CA6B);
+    (mixed.wrapping_mul(0xC2B2_AE35) >> (32 - SIMILAR_BITS)) as usize
 }

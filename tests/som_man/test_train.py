@@ -21,7 +21,7 @@ def trace(kernels, table, options):
 
     class Recorded:
         EMPTY = kernels.EMPTY
-        query = staticmethod(kernels.query)
+        Palette = kernels.Palette
 
         class Learner:
             def __new__(cls, *arguments):
@@ -52,10 +52,10 @@ def test_the_core_equals_the_reference_at_the_default_rate(small_table):
 @pytest.mark.parametrize("fault", ["distance", "tie", "replace", "rate"])
 def test_that_check_notices_the_smallest_faults(small_table, fault):
     class Broken(reference.Learner):
-        def present(self, cells, alpha, falloff):
+        def present(self, start, stop, alpha, falloff):
             if fault == "rate":
                 alpha = np.nextafter(np.float32(alpha), np.float32(1))
-            return super().present(cells, alpha, falloff)
+            return super().present(start, stop, alpha, falloff)
 
         def _attract(self, winner, x, cell, alpha):
             if fault == "replace":  # never replaces what it has stored
@@ -74,7 +74,7 @@ def test_that_check_notices_the_smallest_faults(small_table, fault):
     class Kernels:
         EMPTY = reference.EMPTY
         Learner = Broken
-        query = staticmethod(reference.query)
+        Palette = reference.Palette
 
     must_fail(check_same_bits, Kernels, small_table, TrainOptions(clusters=16, epochs=3, alpha=0.5))
 
@@ -83,20 +83,21 @@ def test_one_step_by_hand():
     """Two units; one presented triple; Eq. 1, 2, 4 and 6 on paper."""
     x = np.array([[0.5, 0.5, 0.5]], np.float32)
     weights = np.array([[0.25, 0.5, 0.5], [1.0, 1.0, 1.0]], np.float32)
-    learner = _core.Learner(x, weights, "paper", 2)
-    distance = learner.present(np.array([0], np.uint32), 0.5, np.ones(1, np.float32))
+    learner = _core.Learner(x, np.array([7], np.uint32), weights, "paper", 2)
+    distance = learner.present(0, 1, 0.5, np.ones(1, np.float32))
     assert distance == 0.25
     # 0.25 + 0.5 · 0.5 · 0.25 = 0.3125, and again, towards what is now stored: 0.3125 + 0.25 · 0.1875 = 0.359375
     assert learner.weights().tolist() == [[0.359375, 0.5, 0.5], [1.0, 1.0, 1.0]]
-    assert learner.stored_cells()[:, 0].tolist() == [0, _core.EMPTY]
+    assert learner.stored_cells()[:, 0].tolist() == [7, _core.EMPTY]
 
 
 def test_ties_go_to_the_lowest_unit():
     x = np.array([[0.5, 0.0, 0.0]], np.float32)
     lut = np.array([[1.0, 0, 0], [0.0, 0, 0]] * 20, np.float32)
-    assert _core.query(x, lut).tolist() == [0]
-    assert reference.query(x, lut).tolist() == [0]
-    assert _core.query(x, lut[1:]).tolist() == [0]
+    assert reference.Palette(lut).query(x).tolist() == [0]
+    for search, simd in itertools.product(("boxes", "all"), _core.simd_paths()):
+        assert _core.Palette(lut, search, simd).query(x).tolist() == [0]
+        assert _core.Palette(lut[1:], search, simd).query(x).tolist() == [0]
 
 
 def test_lut_holds_originals_and_every_cell_its_nearest(small_table):
@@ -177,14 +178,17 @@ def test_no_call_into_the_core_takes_long(small_table, monkeypatch):
 
     class Kernels:
         class Learner(_core.Learner):
-            def present(self, cells, alpha, falloff):
-                counts.append(len(cells) * 16)
-                return super().present(cells, alpha, falloff)
+            def present(self, start, stop, alpha, falloff):
+                counts.append((stop - start) * 16)
+                return super().present(start, stop, alpha, falloff)
 
-        @staticmethod
-        def query(triples, lut):
-            counts.append(len(triples) * len(lut))
-            return _core.query(triples, lut)
+        class Palette:
+            def __init__(self, lut):
+                self.entries, self.palette = len(lut), _core.Palette(lut)
+
+            def query(self, triples):
+                counts.append(len(triples) * self.entries)
+                return self.palette.query(triples)
 
     options = TrainOptions(clusters=16, epochs=2)
     material, _ = train(small_table, options, kernels=Kernels)
@@ -226,11 +230,20 @@ def test_options_may_be_numpys_numbers():
 
 
 def test_the_core_refuses_what_would_read_outside():
-    x, falloff = np.zeros((4, 3), np.float32), np.ones(1, np.float32)
-    with pytest.raises(ValueError, match="within the triples"):
-        _core.Learner(x, x, "paper", 4).present(np.array([4], np.uint32), 0.5, falloff)
-    for arguments in ((x[:, :2], x, "paper", 4), (x, x[:0], "paper", 4), (x, x, "hebb", 4), (x, x, "paper", 0)):
+    x, cells, falloff = np.zeros((4, 3), np.float32), np.arange(4, dtype=np.uint32), np.ones(1, np.float32)
+    learner = _core.Learner(x, cells, x, "paper", 4)
+    for start, stop in ((0, 5), (3, 2)):
+        with pytest.raises(ValueError, match="a range within the triples"):
+            learner.present(start, stop, 0.5, falloff)
+    with pytest.raises(ValueError, match="expected a falloff"):
+        learner.present(0, 4, 0.5, falloff[:0])
+    for arguments in (
+        (x[:, :2], cells, x, "paper", 4), (x, cells[:3], x, "paper", 4), (x, cells, x[:0], "paper", 4),
+        (x, cells, x, "hebb", 4), (x, cells, x, "paper", 0), (x, cells, x, "paper", 4, "luck"),
+        (x, cells, x, "paper", 4, "boxes", "sse9"),
+    ):  # fmt: skip
         with pytest.raises(ValueError, match="expected"):
             _core.Learner(*arguments)
-    with pytest.raises(ValueError, match="at least one entry"):
-        _core.query(x, x[:0])
+    for arguments in ((x[:0],), (x[:, :2],), (x, "scalar"), (x, "boxes", "sse9")):
+        with pytest.raises(ValueError, match="expected"):
+            _core.Palette(*arguments)

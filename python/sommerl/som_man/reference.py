@@ -27,17 +27,21 @@ def squared_distance(x: F32, c: F32) -> F32:
 class Learner:
     """Units of the SOM and their MANs, in training (phases 1 and 2)."""
 
-    def __init__(self, triples: F32, weights: F32, rule: Literal["paper", "kohonen"], columns: int) -> None:
+    def __init__(
+        self, triples: F32, cells: NDArray[np.uint32], weights: F32, rule: Literal["paper", "kohonen"], columns: int
+    ) -> None:
         self._x = triples
+        self._cells = cells
         self._c = weights.copy()
         self._stored = np.full((len(weights), STORED), EMPTY, np.uint32)
+        self._originals = np.full((len(weights), STORED, 3), np.inf, np.float32)
+        self._moved, self._before = False, self._stored.copy()
         self._rule = rule
         self._columns = columns
 
-    def present(self, cells: NDArray[np.uint32], alpha: float, falloff: F32) -> float:
+    def present(self, start: int, stop: int, alpha: float, falloff: F32) -> float:
         total = 0.0
-        for cell in cells:
-            x = self._x[cell]
+        for x, cell in zip(self._x[start:stop], self._cells[start:stop], strict=True):
             squared = squared_distance(x, self._c)  # Eq. 1
             winner = int(squared.argmin())
             total += float(np.sqrt(np.float64(squared[winner])))
@@ -54,18 +58,23 @@ class Learner:
                 self._move(unit, x, alpha if unit == winner else alpha * weight)
 
     def _attract(self, winner: int, x: F32, cell: np.uint32, alpha: np.float32) -> None:
-        c, stored = self._c[winner], self._stored[winner]
-        distances = [
-            np.float32(np.inf) if original == EMPTY else squared_distance(self._x[original], c) for original in stored
-        ]
-        farthest = int(np.argmax(distances))  # Eq. 3
+        c, originals = self._c[winner], self._originals[winner]
+        distances = squared_distance(originals, c)  # infinite where nothing is stored yet
+        farthest = int(distances.argmax())  # Eq. 3
         if squared_distance(x, c) <= distances[farthest]:  # Eq. 5
-            stored[farthest] = cell  # Eq. 4
-        self._move(winner, self._x[stored[farthest]], alpha)  # Eq. 6
+            originals[farthest], self._stored[winner, farthest] = x, cell  # Eq. 4
+        self._move(winner, originals[farthest], alpha)  # Eq. 6
 
     def _move(self, unit: int, x: F32, alpha: np.float32) -> None:
         rate = alpha * x if self._rule == "paper" else alpha
-        self._c[unit] = self._c[unit] + rate * (x - self._c[unit])  # Eq. 2
+        moved = self._c[unit] + rate * (x - self._c[unit])  # Eq. 2
+        self._moved |= bool((moved != self._c[unit]).any())
+        self._c[unit] = moved
+
+    def settled(self) -> bool:
+        settled = not self._moved and np.array_equal(self._stored, self._before)
+        self._moved, self._before = False, self._stored.copy()
+        return settled
 
     def weights(self) -> F32:
         return self._c.copy()
@@ -74,7 +83,11 @@ class Learner:
         return self._stored.copy()
 
 
-def query(triples: F32, lut: F32) -> NDArray[np.uint32]:
-    """The nearest entry of lut (M, 3), the lowest one of several, for each of triples (n, 3): phase 3."""
-    nearest = [squared_distance(x, lut).argmin() for x in triples]
-    return np.array(nearest, np.uint32)
+class Palette:
+    """The LUT, asked for the nearest of its entries (phase 3)."""
+
+    def __init__(self, lut: F32) -> None:
+        self._lut = lut
+
+    def query(self, triples: F32) -> NDArray[np.uint32]:
+        return np.array([squared_distance(x, self._lut).argmin() for x in triples], np.uint32)

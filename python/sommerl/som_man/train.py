@@ -57,16 +57,15 @@ def train(
     rgb = table.values[above]
     x = (rgb / rgb.max()).astype(np.float32)
     order, weights = _start(x, options, table.name)
-    learner = kernels.Learner(x, weights, options.rule, _columns(options))
-    errors = _learn(learner, order, options, progress)
+    learner = kernels.Learner(x[order], order, weights, options.rule, _columns(options))
+    errors = _learn(learner, len(x), options, progress)
 
     cells = _lut_cells(learner.weights(), learner.stored_cells(), x)
     # By brightness: like entries get like numbers, which makes the index smooth and its file small.
     cells = cells[np.argsort((rgb[cells, 0] + rgb[cells, 1]) + rgb[cells, 2], kind="stable")]
     index = np.zeros(table.lattice.shape, np.uint8 if len(cells) <= 256 else np.uint16)
-    index[above] = np.concatenate(
-        [kernels.query(x[start:stop], x[cells]) for start, stop in _calls(len(x), len(cells))]
-    )
+    palette = kernels.Palette(x[cells])
+    index[above] = np.concatenate([palette.query(x[start:stop]) for start, stop in _calls(len(x), len(cells))])
     material = SomManBrdf(
         rgb[cells], index, table.lattice, name=table.name, options=asdict(options), source_sha256=table.source_sha256
     )
@@ -110,20 +109,22 @@ def _falloff(sigma: float) -> NDArray[np.float32]:
     return np.array(weights, np.float32)
 
 
-def _learn(learner: Any, order: NDArray[np.uint32], options: TrainOptions, progress: Progress | None) -> list[float]:
-    """All epochs; the quantisation error of each."""
+def _learn(learner: Any, cells: int, options: TrainOptions, progress: Progress | None) -> list[float]:
+    """All epochs, or as many as change anything; the quantisation error of each."""
     alpha = np.float32(options.alpha)
     errors: list[float] = []
     for epoch in range(options.epochs):
         falloff = _falloff(options.radius * ALPHA_DECAY**epoch)
         total = 0.0
-        for start, stop in _calls(len(order), options.clusters):
-            total += learner.present(order[start:stop], float(alpha), falloff)
+        for start, stop in _calls(cells, options.clusters):
+            total += learner.present(start, stop, float(alpha), falloff)
             if progress:
-                progress(epoch * len(order) + stop, options.epochs * len(order))
-        errors.append(total / len(order))
+                progress(epoch * cells + stop, options.epochs * cells)
+        errors.append(total / cells)
+        if learner.settled():
+            break
         alpha = alpha * np.float32(ALPHA_DECAY)
-    return errors
+    return errors + errors[-1:] * (options.epochs - len(errors))
 
 
 def _calls(cells: int, entries: int) -> list[tuple[int, int]]:
