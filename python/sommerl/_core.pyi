@@ -60,3 +60,20 @@ class Palette:
 
     def query(self, triples: NDArray[np.float32]) -> NDArray[np.uint32]:
         """The nearest entry, the lowest one of several, for each of triples (n, 3)."""
+
+def lookup(
+    wi: NDArray[np.float64],
+    wo: NDArray[np.float64],
+    bins: tuple[int, int, int],
+    reciprocal: bool,
+    trilinear: bool,
+    values: NDArray[np.float64],
+    index: NDArray[np.uint8] | NDArray[np.uint16] | None = None,
+    simd: str | None = None,
+    threads: int | None = None,
+) -> NDArray[np.float64]:
+    """f_r (n, 3) of pairs of unit directions (n, 3), as `Brdf.eval` gives it for what is on a lattice.
+
+    values: flat triples, of the cells, or of a LUT if `index` has its entry for each cell. Angles are within 4 ulp of
+    NumPy's, so that a pair on the very edge of a cell may fall on the other side.
+    """

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any
+from copy import copy
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import _core
 from .arrays import Triple, split
+from .lattice import Interpolation, Lattice, checked
 
 Buffers = Mapping[str, Any]
 
@@ -44,11 +47,47 @@ class Brdf(ABC):
         Shapes broadcast. Zero where either direction is not above the horizon. Raises ValueError for other
         shapes.
         """
-        light, viewer = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
-        if light.shape[-1:] != (3,) or viewer.shape[-1:] != (3,):
-            raise ValueError(f"eval: expected directions of shape (..., 3), found {light.shape} and {viewer.shape}")
-        light, viewer = np.broadcast_arrays(light, viewer)
+        light, viewer = _broadcast(wi, wo)
         above = (light[..., 2] > 0) & (viewer[..., 2] > 0)
         result = np.zeros(light.shape)
         result[above] = np.stack(self.f_r(split(light[above]), split(viewer[above]), self.buffers()), axis=-1)
         return result
+
+
+class OnLattice(Brdf):
+    """A BRDF whose values belong to the cells of a lattice. The core evaluates it; `Brdf.eval` gives the same in NumPy."""
+
+    lattice: Lattice
+    interpolation: Interpolation
+
+    def eval(self, wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float64]:
+        light, viewer = _broadcast(wi, wo)
+        index, values = self.cells()
+        found = _core.lookup(
+            np.ascontiguousarray(light).reshape(-1, 3),
+            np.ascontiguousarray(viewer).reshape(-1, 3),
+            self.lattice.shape,
+            self.lattice.reciprocal,
+            self.interpolation == "trilinear",
+            values.reshape(-1),
+            None if index is None else index.reshape(-1),
+        )
+        return found.reshape(light.shape)
+
+    @abstractmethod
+    def cells(self) -> tuple[NDArray[Any] | None, NDArray[np.float64]]:
+        """The LUT entry of each cell, and the LUT; or None, and the cells' values."""
+
+    def with_interpolation(self, interpolation: Interpolation) -> Self:
+        """The same cells, looked up in another way. Raises MaterialError if there is no such way."""
+        other = copy(self)
+        other.interpolation = checked(interpolation)
+        return other
+
+
+def _broadcast(wi: ArrayLike, wo: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    light, viewer = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    if light.shape[-1:] != (3,) or viewer.shape[-1:] != (3,):
+        raise ValueError(f"eval: expected directions of shape (..., 3), found {light.shape} and {viewer.shape}")
+    light, viewer = np.broadcast_arrays(light, viewer)
+    return light, viewer

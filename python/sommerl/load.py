@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .brdf import Brdf
+from .brdf import Brdf, OnLattice
 from .errors import FormatError, MaterialError
 from .formats import merl
 from .lattice import Interpolation
 from .materials import NAMES, builtin
 from .som_man import file as smrl
-from .som_man.material import SomManBrdf
 from .table import BrdfTable
 
 HEAD_BYTES = 12
@@ -46,7 +45,7 @@ def load(source: str | Path) -> Brdf:
 
 def interpolated(brdf: Brdf, interpolation: Interpolation) -> Brdf:
     """The same material, looked up in another way. Raises MaterialError if it is a formula, or there is no such way."""
-    if isinstance(brdf, BrdfTable | SomManBrdf):
+    if isinstance(brdf, OnLattice):
         return brdf.with_interpolation(interpolation)
     raise MaterialError(f"{brdf.name}: expected a table or a compressed material to look up, found a formula")
 

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import hashlib
-from copy import copy
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .arrays import Triple, gather3
-from .brdf import Brdf, Buffers
+from .brdf import Brdf, Buffers, OnLattice
 from .errors import MaterialError
 from .half_diff import directions
 from .lattice import MERL, Interpolation, Lattice, checked
 
 
-class BrdfTable(Brdf):
+class BrdfTable(OnLattice):
     """A measured or sampled isotropic BRDF.
 
     values: f_r [1/sr], linear RGB, float64, of shape `lattice.shape + (3,)`. Above the horizon, negative and
@@ -70,11 +69,8 @@ class BrdfTable(Brdf):
         table.source_sha256 = getattr(brdf, "source_sha256", table.source_sha256)
         return table
 
-    def with_interpolation(self, interpolation: Interpolation) -> BrdfTable:
-        """The same cells, looked up in another way."""
-        other = copy(self)
-        other.interpolation = checked(interpolation)
-        return other
+    def cells(self) -> tuple[None, NDArray[np.float64]]:
+        return None, self.values
 
     def buffers(self) -> dict[str, NDArray[Any]]:
         return {"values": self.values.reshape(-1)}

@@ -1,5 +1,6 @@
 //! Python bindings of the hot loops. The contracts are in `python/sommerl/_core.pyi`.
 
+mod eval;
 mod nearest;
 mod query;
 mod simd;
@@ -117,14 +118,70 @@ impl Palette {
         if lut.is_empty() || !["boxes", "all"].contains(&search) {
             return Err(PyValueError::new_err("lut: expected at least one entry, and a search in boxes or all"));
         }
-        let threads = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()));
-        Ok(Palette(query::Palette::new(&lut, search == "boxes", path_named(simd)?, threads)))
+        Ok(Palette(query::Palette::new(&lut, search == "boxes", path_named(simd)?, threads_or_all(threads))))
     }
 
     fn query<'py>(&self, py: Python<'py>, triples: Triples<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
         let triples = triples_of(&triples, "triples")?;
         Ok(py.detach(|| self.0.query(&triples)).to_pyarray(py))
     }
+}
+
+/// Rows of three numbers each; borrowed where they lie one after the other.
+fn vectors<'a>(array: &'a PyReadonlyArray2<f64>, name: &str) -> PyResult<&'a [[f64; 3]]> {
+    let (rows, rest) = array.as_slice()?.as_chunks::<3>();
+    if array.shape()[1] != 3 || !rest.is_empty() {
+        return Err(PyValueError::new_err(format!("{name}: expected shape (n, 3), found {:?}", array.shape())));
+    }
+    Ok(rows)
+}
+
+enum Volume<'py> {
+    Index8(PyReadonlyArray1<'py, u8>),
+    Index16(PyReadonlyArray1<'py, u16>),
+    Values,
+}
+
+#[pyfunction]
+#[pyo3(signature = (wi, wo, bins, reciprocal, trilinear, values, index = None, simd = None, threads = None))]
+#[allow(clippy::too_many_arguments)]
+fn lookup<'py>(
+    py: Python<'py>,
+    wi: PyReadonlyArray2<'py, f64>,
+    wo: PyReadonlyArray2<'py, f64>,
+    bins: [usize; 3],
+    reciprocal: bool,
+    trilinear: bool,
+    values: PyReadonlyArray1<'py, f64>,
+    index: Option<Bound<'py, PyAny>>,
+    simd: Option<&str>,
+    threads: Option<usize>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let volume = match &index {
+        None => Volume::Values,
+        Some(array) => match array.extract::<PyReadonlyArray1<u8>>() {
+            Ok(index) => Volume::Index8(index),
+            Err(_) => Volume::Index16(array.extract()?),
+        },
+    };
+    let values = values.as_slice()?;
+    let cells = match &volume {
+        Volume::Values => eval::Cells::Values(values),
+        Volume::Index8(index) => eval::Cells::Index8(index.as_slice()?, values),
+        Volume::Index16(index) => eval::Cells::Index16(index.as_slice()?, values),
+    };
+    let (wi, wo) = (vectors(&wi, "wi")?, vectors(&wo, "wo")?);
+    if wi.len() != wo.len() || bins.contains(&0) || bins.iter().product::<usize>() != cells.len() {
+        return Err(PyValueError::new_err("expected as many wi as wo, and a value for each cell"));
+    }
+    let lattice = eval::Lattice { bins, reciprocal, trilinear };
+    let path = path_named(simd)?;
+    let threads = threads_or_all(threads);
+    matrix(py, py.detach(|| eval::eval(wi, wo, lattice, cells, path, threads)))
+}
+
+fn threads_or_all(threads: Option<usize>) -> usize {
+    threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()))
 }
 
 #[pyfunction]
@@ -138,5 +195,6 @@ fn _core(module: &Bound<PyModule>) -> PyResult<()> {
     module.add("EMPTY", train::EMPTY)?;
     module.add_class::<Learner>()?;
     module.add_class::<Palette>()?;
+    module.add_function(wrap_pyfunction!(lookup, module)?)?;
     module.add_function(wrap_pyfunction!(simd_paths, module)?)
 }

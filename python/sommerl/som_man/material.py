@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from copy import copy
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Triple, gather3, ops
-from ..brdf import Brdf, Buffers
+from ..brdf import Buffers, OnLattice
 from ..errors import MaterialError
 from ..lattice import Interpolation, Lattice, checked
 
 
-class SomManBrdf(Brdf):
+class SomManBrdf(OnLattice):
     """A material compressed by the paper's method: f_r = lut[index[cell]].
 
     lut: (M, 3) f_r [1/sr], linear RGB, float64: values that the source holds.
@@ -60,11 +59,8 @@ class SomManBrdf(Brdf):
         """The LUT entry of each cell, of the lattice's shape, uint8 or uint16; 0 below the horizon."""
         return np.where(self.lattice.above_horizon, self._index, self._index.dtype.type(0))
 
-    def with_interpolation(self, interpolation: Interpolation) -> SomManBrdf:
-        """The same cells, looked up in another way."""
-        other = copy(self)
-        other.interpolation = checked(interpolation)
-        return other
+    def cells(self) -> tuple[NDArray[Any], NDArray[np.float64]]:
+        return self._index, self.lut
 
     @property
     def clusters(self) -> int:
