@@ -55,7 +55,7 @@ class Brdf(ABC):
 
 
 class OnLattice(Brdf):
-    """A BRDF whose values belong to the cells of a lattice. The core evaluates it; `Brdf.eval` gives the same in NumPy."""
+    """A BRDF whose values belong to the cells of a lattice. The core evaluates it, as `Brdf.eval` does in NumPy."""
 
     lattice: Lattice
     interpolation: Interpolation

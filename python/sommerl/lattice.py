@@ -143,9 +143,9 @@ class Lattice:
         """Continuous bin numbers: bin i covers [i, i + 1)."""
         f = ops(theta_h)
         return (
-            self.theta_h * f.sqrt(theta_h / HALF_PI),
-            self.theta_d * (theta_d / HALF_PI),
-            self.phi_d * (phi_d / self.phi_d_range),
+            self.theta_h * f.sqrt(theta_h * (1 / HALF_PI)),
+            theta_d * (self.theta_d / HALF_PI),
+            phi_d * (self.phi_d / self.phi_d_range),
         )
 
 

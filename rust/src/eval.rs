@@ -31,19 +31,9 @@ impl Cells<'_> {
             Cells::Index16(index, _) => index.len(),
         }
     }
-
-    #[inline(always)]
-    fn get(&self, cell: usize) -> [f64; 3] {
-        let (table, at) = match self {
-            Cells::Values(values) => (values, 3 * cell),
-            Cells::Index8(index, lut) => (lut, 3 * index[cell] as usize),
-            Cells::Index16(index, lut) => (lut, 3 * index[cell] as usize),
-        };
-        [table[at], table[at + 1], table[at + 2]]
-    }
 }
 
-/// f_r of each pair (wi, wo) of directions, on several threads.
+/// Writes f_r of each pair (wi, wo) of directions to `out`, on several threads; leaves zeros where one is below the horizon.
 pub fn eval(
     wi: &[[f64; 3]],
     wo: &[[f64; 3]],
@@ -51,48 +41,82 @@ pub fn eval(
     cells: Cells,
     path: Path,
     threads: usize,
-) -> Vec<[f64; 3]> {
-    let mut out = vec![[0.0; 3]; wi.len()];
-    let share = wi.len().div_ceil(threads.max(1)).next_multiple_of(BATCH);
+    out: &mut [[f64; 3]],
+) {
+    let share = wi.len().div_ceil(threads.max(1)).next_multiple_of(BATCH).max(BATCH);
     std::thread::scope(|scope| {
         for ((wi, wo), out) in wi.chunks(share).zip(wo.chunks(share)).zip(out.chunks_mut(share)) {
             scope.spawn(move || eval_part(wi, wo, lattice, cells, path, out));
         }
     });
-    out
 }
 
 fn eval_part(wi: &[[f64; 3]], wo: &[[f64; 3]], lattice: Lattice, cells: Cells, path: Path, out: &mut [[f64; 3]]) {
+    let mut at = [[0.0; BATCH]; 3];
     for ((wi, wo), out) in wi.chunks(BATCH).zip(wo.chunks(BATCH)).zip(out.chunks_mut(BATCH)) {
         // SAFETY: a path is only ever one that this processor has.
-        let position = unsafe {
+        unsafe {
             match path {
-                Path::Portable => positions(wi, wo, lattice),
+                Path::Portable => positions(wi, wo, lattice, &mut at),
                 #[cfg(target_arch = "x86_64")]
-                Path::Avx2 => positions_avx2(wi, wo, lattice),
+                Path::Avx2 => positions_avx2(wi, wo, lattice, &mut at),
                 #[cfg(target_arch = "x86_64")]
-                Path::Avx512 => positions_avx512(wi, wo, lattice),
+                Path::Avx512 => positions_avx512(wi, wo, lattice, &mut at),
             }
-        };
-        for (i, value) in out.iter_mut().enumerate() {
-            if wi[i][2] > 0.0 && wo[i][2] > 0.0 {
-                let at = position.map(|axis| axis[i]);
-                *value = if lattice.trilinear { trilinear(at, lattice, cells) } else { nearest(at, lattice, cells) };
+        }
+        match cells {
+            Cells::Values(values) => {
+                if !lattice.trilinear {
+                    at[0].iter().for_each(|&cell| prefetch(values, 3 * (cell as u32 as usize)));
+                }
+                fill(wi, wo, lattice, &at, out, |cell| triple(values, cell));
             }
+            Cells::Index8(index, lut) => fill(wi, wo, lattice, &at, out, |cell| triple(lut, index[cell] as usize)),
+            Cells::Index16(index, lut) => fill(wi, wo, lattice, &at, out, |cell| triple(lut, index[cell] as usize)),
         }
     }
 }
 
+/// Asks for a line of memory before it is read: a table is larger than the caches, and its cells are read in no order.
 #[inline(always)]
-fn nearest(at: [f64; 3], lattice: Lattice, cells: Cells) -> [f64; 3] {
-    let [h, d, p] = std::array::from_fn(|axis| (at[axis] as usize).min(lattice.bins[axis] - 1));
-    cells.get(p + lattice.bins[2] * (d + lattice.bins[1] * h))
+fn prefetch(table: &[f64], at: usize) {
+    #[cfg(target_arch = "x86_64")]
+    // SAFETY: prefetching is allowed for any address.
+    unsafe {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        _mm_prefetch::<_MM_HINT_T0>(table.as_ptr().wrapping_add(at).cast());
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (table, at);
+}
+
+#[inline(always)]
+fn triple(table: &[f64], entry: usize) -> [f64; 3] {
+    [table[3 * entry], table[3 * entry + 1], table[3 * entry + 2]]
+}
+
+#[inline(always)]
+fn fill(
+    wi: &[[f64; 3]],
+    wo: &[[f64; 3]],
+    lattice: Lattice,
+    at: &[Batch; 3],
+    out: &mut [[f64; 3]],
+    get: impl Fn(usize) -> [f64; 3],
+) {
+    for (i, value) in out.iter_mut().enumerate() {
+        let found = if lattice.trilinear {
+            trilinear([at[0][i], at[1][i], at[2][i]], lattice.bins, &get)
+        } else {
+            get(at[0][i] as u32 as usize)
+        };
+        *value = if (wi[i][2] > 0.0) & (wo[i][2] > 0.0) { found } else { [0.0; 3] };
+    }
 }
 
 /// As `Lattice.corners` and `Lattice.lookup`: θ_h and θ_d clamp, φ_d wraps; corners are added up in the same order.
 #[inline(always)]
-fn trilinear(at: [f64; 3], lattice: Lattice, cells: Cells) -> [f64; 3] {
-    let [bins_h, bins_d, bins_p] = lattice.bins;
+fn trilinear(at: [f64; 3], [bins_h, bins_d, bins_p]: [usize; 3], get: impl Fn(usize) -> [f64; 3]) -> [f64; 3] {
     let (h0, h1, a) = between(at[0], bins_h);
     let (d0, d1, b) = between(at[1], bins_d);
     let below = (at[2] - 0.5).floor();
@@ -103,7 +127,7 @@ fn trilinear(at: [f64; 3], lattice: Lattice, cells: Cells) -> [f64; 3] {
     for (h, u) in [(h0, 1.0 - a), (h1, a)] {
         for (d, v) in [(d0, 1.0 - b), (d1, b)] {
             for (p, w) in [(p0, 1.0 - c), (p1, c)] {
-                let value = cells.get(p + bins_p * (d + bins_d * h));
+                let value = get(p + bins_p * (d + bins_d * h));
                 for j in 0..3 {
                     sum[j] += u * v * w * value[j];
                 }
@@ -122,19 +146,29 @@ fn between(position: f64, bins: usize) -> (usize, usize, f64) {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-unsafe fn positions_avx2(wi: &[[f64; 3]], wo: &[[f64; 3]], lattice: Lattice) -> [Batch; 3] {
-    positions(wi, wo, lattice)
+unsafe fn positions_avx2(wi: &[[f64; 3]], wo: &[[f64; 3]], lattice: Lattice, at: &mut [Batch; 3]) {
+    positions(wi, wo, lattice, at)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,avx512vl")]
-unsafe fn positions_avx512(wi: &[[f64; 3]], wo: &[[f64; 3]], lattice: Lattice) -> [Batch; 3] {
-    positions(wi, wo, lattice)
+unsafe fn positions_avx512(wi: &[[f64; 3]], wo: &[[f64; 3]], lattice: Lattice, at: &mut [Batch; 3]) {
+    positions(wi, wo, lattice, at)
 }
 
-/// Continuous bin numbers of a batch of pairs, as `half_diff` and `Lattice._position` give them.
+/// Continuous bin numbers of a batch of pairs, as `half_diff` and `Lattice._position` give them; for the nearest cell, its
+/// number in the place of the first.
 #[inline(always)]
-fn positions(wi: &[[f64; 3]], wo: &[[f64; 3]], lattice: Lattice) -> [Batch; 3] {
+fn positions(wi: &[[f64; 3]], wo: &[[f64; 3]], lattice: Lattice, at: &mut [Batch; 3]) {
+    if lattice.trilinear {
+        positions_for::<true>(wi, wo, lattice, at)
+    } else {
+        positions_for::<false>(wi, wo, lattice, at)
+    }
+}
+
+#[inline(always)]
+fn positions_for<const TRILINEAR: bool>(wi: &[[f64; 3]], wo: &[[f64; 3]], lattice: Lattice, at: &mut [Batch; 3]) {
     let mut pairs = [[0.0; BATCH]; 6];
     for (i, (a, b)) in wi.iter().zip(wo).enumerate() {
         for j in 0..3 {
@@ -145,7 +179,6 @@ fn positions(wi: &[[f64; 3]], wo: &[[f64; 3]], lattice: Lattice) -> [Batch; 3] {
     let half_pi = std::f64::consts::FRAC_PI_2;
     let [bins_h, bins_d, bins_p] = lattice.bins.map(|n| n as f64);
     let range = if lattice.reciprocal { std::f64::consts::PI } else { std::f64::consts::TAU };
-    let mut out = [[0.0; BATCH]; 3];
     for i in 0..BATCH {
         let (sx, sy, sz) = (pairs[0][i] + pairs[3][i], pairs[1][i] + pairs[4][i], pairs[2][i] + pairs[5][i]);
         let (vx, vy, vz) = (pairs[0][i] - pairs[3][i], pairs[1][i] - pairs[4][i], pairs[2][i] - pairs[5][i]);
@@ -159,36 +192,47 @@ fn positions(wi: &[[f64; 3]], wo: &[[f64; 3]], lattice: Lattice) -> [Batch; 3] {
         let (up, across) = if other { (-y, -x + 0.0) } else { (y, x + 0.0) };
         let folded = atan2(up, across);
         let phi_d = if lattice.reciprocal | !other { folded } else { folded + std::f64::consts::PI };
-        out[0][i] = bins_h * (theta_h / half_pi).sqrt();
-        out[1][i] = bins_d * (theta_d / half_pi);
-        out[2][i] = bins_p * (phi_d / range);
+        let u = bins_h * (theta_h * (1.0 / half_pi)).sqrt();
+        let (v, w) = (theta_d * (bins_d / half_pi), phi_d * (bins_p / range));
+        let bin = |position: f64, bins: f64| position.min(bins - 1.0).floor();
+        let cell = bin(w, bins_p) + bins_p * (bin(v, bins_d) + bins_d * bin(u, bins_h));
+        at[0][i] = if TRILINEAR { u } else { cell };
+        if TRILINEAR {
+            at[1][i] = v;
+            at[2][i] = w;
+        }
     }
-    out
 }
 
-/// The angle of (x, y) for y >= 0, in [0, π]; 0 for (0, 0). Rational approximation of Cephes (S. L. Moshier 1989), without
-/// branches.
+/// The angle of (x, y) for y >= 0, in [0, π]; 0 for (0, 0). Within 2 ulp. The reduction to |t| < 7/16 and the polynomial are those
+/// of fdlibm (Sun Microsystems 1993); here without branches and with one division, so that it vectorises.
 #[inline(always)]
 fn atan2(y: f64, x: f64) -> f64 {
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
-    let (a, b) = (y, x.abs());
-    let steep = a > b;
-    let (small, large) = if steep { (b, a) } else { (a, b) };
-    // t = small / large in [0, 1]; above 0.66, atan t = π/4 + atan((t - 1) / (t + 1)).
-    let upper = small > 0.66 * large;
-    let (top, bottom) = if upper { (small - large, small + large) } else { (small, large) };
+    const ATAN_HALF: f64 = 4.636_476_090_008_061e-1;
+    let a = x.abs();
+    let steep = y > a;
+    let (small, large) = if steep { (a, y) } else { (y, a) };
+    // atan t = atan ½ + atan((2 t - 1) / (2 + t)) = π/4 + atan((t - 1) / (t + 1))
+    let (middle, upper) = (small > 0.4375 * large, small > 0.6875 * large);
+    let top = if middle { 2.0 * small - large } else { small };
+    let bottom = if middle { 2.0 * large + small } else { large };
+    let top = if upper { small - large } else { top };
+    let bottom = if upper { small + large } else { bottom };
+    let base = if middle { ATAN_HALF } else { 0.0 };
+    let rest = if middle { 2.269_877_745_296_168_7e-17 } else { 0.0 };
+    let base = if upper { FRAC_PI_4 } else { base };
+    let rest = if upper { 3.061_616_997_868_383e-17 } else { rest };
     let t = top / if bottom == 0.0 { 1.0 } else { bottom };
-    let z = t * t;
-    let p = (((-8.750_608_600_031_904e-1 * z - 1.615_753_718_733_365e1) * z - 7.500_855_792_314_705e1) * z
-        - 1.228_866_684_490_136_1e2)
-        * z
-        - 6.485_021_904_942_025e1;
-    let q = ((((z + 2.485_846_490_142_306_2e1) * z + 1.650_270_098_316_988_6e2) * z + 4.328_810_604_912_902_6e2) * z
-        + 4.853_903_996_359_137e2)
-        * z
-        + 1.945_506_571_482_614e2;
-    let angle = t * (z * p / q) + t;
-    let angle = if upper { (angle + 0.5 * 6.123_233_995_736_766e-17) + FRAC_PI_4 } else { angle };
+    let (z, w) = (t * t, (t * t) * (t * t));
+    let odd = 3.333_333_333_333_293e-1
+        + w * (1.428_571_427_250_346_6e-1
+            + w * (9.090_887_133_436_507e-2
+                + w * (6.661_073_137_387_531e-2 + w * (4.976_877_994_615_932e-2 + w * 1.628_582_011_536_578_2e-2))));
+    let even = -1.999_999_999_987_648_3e-1
+        + w * (-1.111_111_040_546_235_6e-1
+            + w * (-7.691_876_205_044_83e-2 + w * (-5.833_570_133_790_573e-2 + w * -3.653_157_274_421_691_6e-2)));
+    let angle = base - ((t * (z * odd + w * even) - rest) - t);
     let angle = if steep { FRAC_PI_2 - angle } else { angle };
     if x < 0.0 { PI - angle } else { angle }
 }

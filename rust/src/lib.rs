@@ -14,14 +14,6 @@ use simd::Path;
 
 type Triples<'py> = PyReadonlyArray2<'py, f32>;
 
-fn triples_of(array: &Triples, name: &str) -> PyResult<Vec<[f32; 3]>> {
-    if array.shape()[1] != 3 {
-        let (rows, columns) = (array.shape()[0], array.shape()[1]);
-        return Err(PyValueError::new_err(format!("{name}: expected shape (n, 3), found ({rows}, {columns})")));
-    }
-    Ok(array.as_array().rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
-}
-
 fn matrix<'py, T: numpy::Element + Copy>(py: Python<'py>, rows: Vec<[T; 3]>) -> PyResult<Bound<'py, PyArray2<T>>> {
     rows.as_flattened().to_pyarray(py).reshape([rows.len(), 3])
 }
@@ -54,12 +46,12 @@ impl Learner {
         search: &str,
         simd: Option<&str>,
     ) -> PyResult<Self> {
-        let (triples, weights) = (triples_of(&triples, "triples")?, triples_of(&weights, "weights")?);
+        let (triples, weights) = (rows(&triples, "triples")?.to_vec(), rows(&weights, "weights")?);
         let cells = cells.as_slice()?.to_vec();
         if weights.is_empty() || columns == 0 || cells.len() != triples.len() {
             return Err(PyValueError::new_err("expected at least one unit and column, and as many cells as triples"));
         }
-        let mut learner = train::Learner::new(triples, cells, &weights);
+        let mut learner = train::Learner::new(triples, cells, weights);
         learner.columns = columns;
         learner.path = path_named(simd)?;
         learner.rule = match rule {
@@ -114,21 +106,27 @@ impl Palette {
     #[new]
     #[pyo3(signature = (lut, search = "boxes", simd = None, threads = None))]
     fn new(lut: Triples, search: &str, simd: Option<&str>, threads: Option<usize>) -> PyResult<Self> {
-        let lut = triples_of(&lut, "lut")?;
+        let lut = rows(&lut, "lut")?;
         if lut.is_empty() || !["boxes", "all"].contains(&search) {
             return Err(PyValueError::new_err("lut: expected at least one entry, and a search in boxes or all"));
         }
-        Ok(Palette(query::Palette::new(&lut, search == "boxes", path_named(simd)?, threads_or_all(threads))))
+        Ok(Palette(query::Palette::new(lut, search == "boxes", path_named(simd)?, threads_or_all(threads))))
     }
 
     fn query<'py>(&self, py: Python<'py>, triples: Triples<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
-        let triples = triples_of(&triples, "triples")?;
-        Ok(py.detach(|| self.0.query(&triples)).to_pyarray(py))
+        let triples = rows(&triples, "triples")?;
+        let found = PyArray1::zeros(py, triples.len(), false);
+        {
+            let mut out = found.try_readwrite()?;
+            let out = out.as_slice_mut()?;
+            py.detach(|| self.0.query(triples, out));
+        }
+        Ok(found)
     }
 }
 
 /// Rows of three numbers each; borrowed where they lie one after the other.
-fn vectors<'a>(array: &'a PyReadonlyArray2<f64>, name: &str) -> PyResult<&'a [[f64; 3]]> {
+fn rows<'a, T: numpy::Element>(array: &'a PyReadonlyArray2<T>, name: &str) -> PyResult<&'a [[T; 3]]> {
     let (rows, rest) = array.as_slice()?.as_chunks::<3>();
     if array.shape()[1] != 3 || !rest.is_empty() {
         return Err(PyValueError::new_err(format!("{name}: expected shape (n, 3), found {:?}", array.shape())));
@@ -170,14 +168,20 @@ fn lookup<'py>(
         Volume::Index8(index) => eval::Cells::Index8(index.as_slice()?, values),
         Volume::Index16(index) => eval::Cells::Index16(index.as_slice()?, values),
     };
-    let (wi, wo) = (vectors(&wi, "wi")?, vectors(&wo, "wo")?);
+    let (wi, wo) = (rows(&wi, "wi")?, rows(&wo, "wo")?);
     if wi.len() != wo.len() || bins.contains(&0) || bins.iter().product::<usize>() != cells.len() {
         return Err(PyValueError::new_err("expected as many wi as wo, and a value for each cell"));
     }
     let lattice = eval::Lattice { bins, reciprocal, trilinear };
     let path = path_named(simd)?;
     let threads = threads_or_all(threads);
-    matrix(py, py.detach(|| eval::eval(wi, wo, lattice, cells, path, threads)))
+    let found = PyArray2::zeros(py, [wi.len(), 3], false);
+    {
+        let mut out = found.try_readwrite()?;
+        let (rows, _) = out.as_slice_mut()?.as_chunks_mut::<3>();
+        py.detach(|| eval::eval(wi, wo, lattice, cells, path, threads, rows));
+    }
+    Ok(found)
 }
 
 fn threads_or_all(threads: Option<usize>) -> usize {

@@ -19,16 +19,14 @@ impl Palette {
         Palette { lut, in_boxes, path, threads: threads.max(1) }
     }
 
-    /// The nearest entry, the lowest of several, of each triple.
-    pub fn query(&self, triples: &[[f32; 3]]) -> Vec<u32> {
-        let mut found = vec![0; triples.len()];
+    /// Writes the nearest entry, the lowest of several, of each triple.
+    pub fn query(&self, triples: &[[f32; 3]], found: &mut [u32]) {
         let share = triples.len().div_ceil(self.threads).max(1);
         std::thread::scope(|scope| {
             for (part, out) in triples.chunks(share).zip(found.chunks_mut(share)) {
                 scope.spawn(|| self.query_part(part, out));
             }
         });
-        found
     }
 
     fn query_part(&self, triples: &[[f32; 3]], found: &mut [u32]) {

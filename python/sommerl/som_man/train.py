@@ -79,15 +79,15 @@ def _start(x: NDArray[np.float32], options: TrainOptions, name: str) -> tuple[ND
     Both permutations sort raw output of a bit generator, whose stream, unlike NumPy's own shuffles, never changes.
     """
     raw = np.random.PCG64(options.seed).random_raw(2 * len(x))
-    shuffled = np.argsort(raw[: len(x)], kind="stable")
-    drawn = x[np.argsort(raw[len(x) :], kind="stable")]
-    order = shuffled if options.order == "seeded" else np.arange(len(x))
+    order = np.argsort(raw[: len(x)], kind="stable") if options.order == "seeded" else np.arange(len(x))
     taken = 4 * options.clusters
     while True:
+        few = np.argpartition(raw[len(x) :], min(taken, len(x)) - 1)[:taken]
+        drawn = x[few[np.argsort(raw[len(x) :][few], kind="stable")]]
         _, first = np.unique(drawn[:taken], axis=0, return_index=True)
         if len(first) >= options.clusters:
             return order.astype(np.uint32), drawn[np.sort(first)[: options.clusters]]
-        if taken >= len(drawn):
+        if taken >= len(x):
             raise MaterialError(
                 f"{name}: expected at least {options.clusters} distinct colours, one a cluster, found {len(first)}"
             )
