@@ -93,10 +93,12 @@ class Lattice:
         A pair of directions just above the horizon may fall into a cell whose centre is below it, or have such a cell
         as a neighbour when interpolating.
         """
-        h, d, p = np.ogrid[: self.theta_h, : self.theta_d, : self.phi_d]
-        h = np.minimum(h, self.above_horizon[:, :1].sum(axis=0, keepdims=True) - 1)
-        last = self.above_horizon.sum(axis=1, keepdims=True) - 1
-        return values[h, np.minimum(d, last[h, 0, p]), p]
+        h, _, p = np.nonzero(~self.above_horizon)
+        h = np.minimum(h, self.above_horizon[:, 0].sum(axis=0)[p] - 1)
+        last = self.above_horizon.sum(axis=1) - 1
+        extended = values.copy()
+        extended[~self.above_horizon] = values[h, last[h, p], p]
+        return extended
 
     def cell(self, theta_h: Array, theta_d: Array, phi_d: Array) -> Array:
         """The number of the cell that holds the given angles [rad]."""

@@ -42,15 +42,18 @@ class TableMetrics:
 def table_metrics(reference: NDArray[np.float64], candidate: NDArray[np.float64], lattice: Lattice) -> TableMetrics:
     """Compares f_r of two tables of shape `lattice.shape + (3,)`."""
     above = lattice.above_horizon
-    cos_i, cos_o = (cosine[above] for cosine in lattice.cosines())
-    weight = lattice.solid_angles()[above] * cos_i * cos_o
-    a, b = reference[above], candidate[above]
-    squared = (b - a) ** 2
-    log_squared = (np.log(b + LOG_FLOOR) - np.log(a + LOG_FLOOR)) ** 2
+    cos_i, cos_o = lattice.cosines()
+    weights = np.where(above, lattice.solid_angles() * cos_i * cos_o, 0.0)
+    squared = energy = log_squared = 0.0
+    for cells, weight, a, b in zip(above, weights, reference, candidate, strict=True):  # a slice of θ_h at a time
+        squared += float(((b - a)[cells] ** 2).sum())
+        energy += float((a[cells] ** 2).sum())
+        log_difference = np.log(np.where(cells[..., None], (b + LOG_FLOOR) / (a + LOG_FLOOR), 1.0))
+        log_squared += float((weight[..., None] * log_difference**2).sum())
     return TableMetrics(
-        rmse=float(np.sqrt(squared.mean())),
-        log_error_cosine=float(np.sqrt(np.average(log_squared.mean(axis=-1), weights=weight))),
-        relative_error=float(np.sqrt(squared.sum() / (a**2).sum())),
+        rmse=float(np.sqrt(squared / (3 * above.sum()))),
+        log_error_cosine=float(np.sqrt(log_squared / (3 * weights.sum()))),
+        relative_error=float(np.sqrt(squared / energy)),
     )
 
 

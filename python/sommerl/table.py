@@ -36,19 +36,19 @@ class BrdfTable(OnLattice):
         interpolation: Interpolation = "trilinear",
         source_sha256: str | None = None,
     ) -> None:
-        f_r = np.array(values, np.float64)
+        f_r = np.asarray(values, np.float64)
         if f_r.shape != (*lattice.shape, 3):
             raise MaterialError(f"expected values of shape {(*lattice.shape, 3)}, found {f_r.shape}")
+        self.values: NDArray[np.float64] = lattice.extended(f_r)
         # Not true, either, of NaN. Renderers calculate in single precision.
-        unusable = ~((f_r >= 0) & (f_r <= np.finfo(np.float32).max)) & lattice.above_horizon[..., None]
-        f_r[unusable] = 0.0
-        if not (f_r[lattice.above_horizon] > 0).any():
+        unusable = ~((self.values >= 0) & (self.values <= np.finfo(np.float32).max))
+        self.values[unusable] = 0.0
+        if not (self.values > 0).any():
             raise MaterialError("expected a positive, finite reflectance above the horizon, found none")
         self.name = name
         self.lattice = lattice
         self.interpolation: Interpolation = checked(interpolation)
-        self.cells_clamped = int(unusable.any(axis=-1).sum())
-        self.values: NDArray[np.float64] = lattice.extended(f_r)
+        self.cells_clamped = int(unusable[lattice.above_horizon].any(axis=-1).sum())
         self.source_sha256 = source_sha256 or hashlib.sha256(self.values.astype("<f8").tobytes()).hexdigest()
 
     @classmethod

@@ -48,10 +48,12 @@ def read(path: str | Path) -> BrdfTable:
     if length != expected:
         raise FormatError(f"{path}: expected {expected} bytes for these dimensions, found {length}")
     data = path.read_bytes()
+    digest = hashlib.sha256(data).hexdigest()
     planes = np.frombuffer(data, "<f8", offset=HEADER_BYTES).reshape(3, *lattice.shape)
     values = np.moveaxis(planes, 0, -1) * SCALE
+    del data, planes
     try:
-        return BrdfTable(values, lattice, name=_printable(path.stem), source_sha256=hashlib.sha256(data).hexdigest())
+        return BrdfTable(values, lattice, name=_printable(path.stem), source_sha256=digest)
     except MaterialError as error:
         raise MaterialError(f"{path}: {error}") from error
 
