@@ -71,7 +71,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     table = load_table(options.file)
-    results = query(table, options.rounds) | lookup(table, options.pairs, options.rounds)
+    results = query(table, 20) | lookup(table, options.pairs, options.rounds)
     print("| peer : ours | times our time, median (least-most) |\n|---|---|")
     for name, value in results.items():
         print(f"| {name} | {text(value)} |")
