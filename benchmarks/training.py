@@ -3,7 +3,7 @@
     uv run --group bench python benchmarks/training.py FOLDER [--clusters 1000] [--epochs 30] [--rounds 3] [--json FILE]
 
 FOLDER holds MERL tables of the three materials. Peers: our own SIMD search among all units; the same one by one
-(timed for one epoch, which costs as much as any other); faiss k-means, 20 iterations on all points; MiniSom, per sample.
+(timed for one epoch, which costs as much as any other); faiss k-means, 20 iterations on all points; MiniSom, a sample.
 """
 
 from __future__ import annotations

@@ -175,7 +175,8 @@ fn lookup<'py>(
     let lattice = eval::Lattice { bins, reciprocal, trilinear };
     let path = path_named(simd)?;
     let threads = threads_or_all(threads);
-    let found = PyArray2::zeros(py, [wi.len(), 3], false);
+    // SAFETY: `eval` writes every element. NumPy gives large arrays large pages, which calloc's zeros do not get.
+    let found = unsafe { PyArray2::new(py, [wi.len(), 3], false) };
     {
         let mut out = found.try_readwrite()?;
         let (rows, _) = out.as_slice_mut()?.as_chunks_mut::<3>();
