@@ -127,11 +127,13 @@ impl Palette {
 
 /// Rows of three numbers each; borrowed where they lie one after the other.
 fn rows<'a, T: numpy::Element>(array: &'a PyReadonlyArray2<T>, name: &str) -> PyResult<&'a [[T; 3]]> {
-    let (rows, rest) = array.as_slice()?.as_chunks::<3>();
-    if array.shape()[1] != 3 || !rest.is_empty() {
-        return Err(PyValueError::new_err(format!("{name}: expected shape (n, 3), found {:?}", array.shape())));
+    if array.shape()[1] != 3 || !array.is_c_contiguous() {
+        return Err(PyValueError::new_err(format!(
+            "{name}: expected rows of 3 in one piece, found {:?}",
+            array.shape()
+        )));
     }
-    Ok(rows)
+    Ok(array.as_slice()?.as_chunks::<3>().0)
 }
 
 enum Volume<'py> {
