@@ -59,6 +59,7 @@ class OnLattice(Brdf):
 
     lattice: Lattice
     interpolation: Interpolation
+    source_sha256: str
 
     def eval(self, wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float64]:
         light, viewer = _broadcast(wi, wo)

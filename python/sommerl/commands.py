@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from . import console
-from .brdf import Brdf
-from .describe import compression_rows, describe, image_rows, label, text, trained
+from .brdf import Brdf, OnLattice
+from .describe import compression_rows, describe, image_rows, label, lookup, table_rows, text, trained
 from .errors import FormatError, OptionError
 from .files import check_writable
 from .formats import merl
@@ -122,19 +122,14 @@ def compare(options: Namespace) -> dict[str, Any]:
     if options.output:
         write_image(options.output, side_by_side(comparison.pictures()))
     tables = _sampled(reference, candidate)
-    metrics = table_metrics(tables[0].values, tables[1].values, tables[0].lattice)
-    result = asdict(comparison.metrics) | {f"table_{name}": value for name, value in asdict(metrics).items()}
+    metrics = asdict(table_metrics(tables[0].values, tables[1].values, tables[0].lattice))
+    result = asdict(comparison.metrics) | {f"table_{name}": value for name, value in metrics.items()}
     result |= {"reference": label(reference), "candidate": label(candidate)}
     if options.output:
         result["image"] = str(options.output)
     if not options.json:
-        lookups = [getattr(brdf, "interpolation", "formula") for brdf in (reference, candidate)]
-        rows = {"lookup": " against ".join(dict.fromkeys(lookups))} | image_rows(comparison.metrics)
-        rows |= {
-            "table: RMSE [1/sr]": f"{metrics.rmse:.3g}",
-            "table: log error, cosine-weighted": f"{metrics.log_error_cosine:.4f}",
-            "table: relative error": f"{metrics.relative_error:.3g}",
-        }
+        lookups = dict.fromkeys((lookup(reference), lookup(candidate)))
+        rows = {"lookup": " against ".join(lookups)} | image_rows(comparison.metrics) | table_rows(metrics)
         console.print_rows(f"{options.reference} against {options.candidate}", rows)
     return result
 
@@ -164,12 +159,12 @@ def render(options: Namespace) -> dict[str, Any]:
     }
 
 
-def _alike(reference: Brdf, candidate: Brdf, lookup: Any) -> tuple[Brdf, Brdf]:
+def _alike(reference: Brdf, candidate: Brdf, asked: Any) -> tuple[Brdf, Brdf]:
     """Both, looked up as asked; else a table as the SOM-MAN material on its lattice, so that like meets like."""
 
     def adapted(brdf: Brdf, other: Brdf) -> Brdf:
-        if lookup:
-            return interpolated(brdf, lookup)
+        if asked:
+            return interpolated(brdf, asked)
         if isinstance(brdf, BrdfTable) and isinstance(other, SomManBrdf) and other.lattice == brdf.lattice:
             return brdf.with_interpolation(other.interpolation)
         return brdf
@@ -179,7 +174,7 @@ def _alike(reference: Brdf, candidate: Brdf, lookup: Any) -> tuple[Brdf, Brdf]:
 
 def _sampled(reference: Brdf, candidate: Brdf) -> tuple[BrdfTable, BrdfTable]:
     """Both at the cell centres of one lattice: the reference's, the candidate's or MERL's."""
-    lattices = [brdf.lattice for brdf in (reference, candidate) if isinstance(brdf, BrdfTable | SomManBrdf)]
+    lattices = [brdf.lattice for brdf in (reference, candidate) if isinstance(brdf, OnLattice)]
     first, second = (BrdfTable.sample(brdf, *lattices[:1]) for brdf in (reference, candidate))
     return first, second
 

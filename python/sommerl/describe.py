@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
 from . import console
-from .brdf import Brdf
+from .brdf import Brdf, OnLattice
 from .metrics import ImageMetrics, table_metrics
 from .som_man.material import SomManBrdf
 from .som_man.options import TrainOptions
@@ -38,7 +39,7 @@ def describe(brdf: Brdf, bytes_disk: int | None) -> dict[str, Any]:
     if isinstance(brdf, BrdfTable):
         kind = "table"
         known |= {"domain": "linear", "bytes_memory": brdf.values.nbytes, "cells_clamped": brdf.cells_clamped}
-    if isinstance(brdf, SomManBrdf | BrdfTable):
+    if isinstance(brdf, OnLattice):
         known |= {"lattice": list(brdf.lattice.shape), "interpolation": brdf.interpolation}
         known["source_sha256"] = brdf.source_sha256
     return {"kind": kind, "name": brdf.name, **known, "bytes_disk": bytes_disk}
@@ -46,7 +47,12 @@ def describe(brdf: Brdf, bytes_disk: int | None) -> dict[str, Any]:
 
 def label(brdf: Brdf) -> str:
     """A material's name, and how it is looked up."""
-    return f"{brdf.name} ({getattr(brdf, 'interpolation', 'formula')})"
+    return f"{brdf.name} ({lookup(brdf)})"
+
+
+def lookup(brdf: Brdf) -> str:
+    """How a material is looked up."""
+    return brdf.interpolation if isinstance(brdf, OnLattice) else "formula"
 
 
 def text(value: Any) -> str:
@@ -63,9 +69,7 @@ def compression_rows(material: SomManBrdf, bytes_disk: int, report: TrainReport)
         "clusters": f"{material.clusters}{dropped}",
         "epochs": str(len(report.quantisation_error)),
         "quantisation error, last epoch, of the largest value": f"{report.quantisation_error[-1]:.3g}",
-        "table: RMSE [1/sr]": f"{material.metrics['rmse']:.3g}",
-        "table: log error, cosine-weighted": f"{material.metrics['log_error_cosine']:.4f}",
-        "table: relative error": f"{material.metrics['relative_error']:.3g}",
+        **table_rows(material.metrics),
         "size as the paper counts it": console.size(material.bytes_paper),
         "size in memory": console.size(material.bytes_memory),
         "size on disk": console.size(bytes_disk),
@@ -73,6 +77,15 @@ def compression_rows(material: SomManBrdf, bytes_disk: int, report: TrainReport)
     if report.cells_clamped:
         rows["cells clamped to 0"] = str(report.cells_clamped)
     return rows | {"training": f"{report.seconds:.1f} s"}
+
+
+def table_rows(metrics: Mapping[str, float]) -> dict[str, str]:
+    """Distances between two tables: the fields of `TableMetrics`."""
+    return {
+        "table: RMSE [1/sr]": f"{metrics['rmse']:.3g}",
+        "table: log error, cosine-weighted": f"{metrics['log_error_cosine']:.4f}",
+        "table: relative error": f"{metrics['relative_error']:.3g}",
+    }
 
 
 def image_rows(metrics: ImageMetrics) -> dict[str, str]:

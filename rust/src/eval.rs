@@ -33,7 +33,8 @@ impl Cells<'_> {
     }
 }
 
-/// Writes f_r of each pair (wi, wo) of directions to `out`, on several threads; leaves zeros where one is below the horizon.
+/// Writes f_r of each pair (wi, wo) of directions to `out`, on several threads; zeros where one is below the horizon. Every
+/// element is written: `out` may be fresh memory.
 pub fn eval(
     wi: &[[f64; 3]],
     wo: &[[f64; 3]],

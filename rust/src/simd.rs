@@ -234,7 +234,11 @@ impl Path {
             if std::is_x86_feature_detected!("avx2") {
                 paths.push(("avx2", Path::Avx2));
             }
-            if std::is_x86_feature_detected!("avx512f") {
+            // The last two for `eval`: the first processors with AVX-512 lack them.
+            if std::is_x86_feature_detected!("avx512f")
+                && std::is_x86_feature_detected!("avx512dq")
+                && std::is_x86_feature_detected!("avx512vl")
+            {
                 paths.push(("avx512", Path::Avx512));
             }
         }

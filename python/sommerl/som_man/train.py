@@ -84,7 +84,7 @@ def _start(x: NDArray[np.float32], options: TrainOptions, name: str) -> tuple[ND
     while True:
         few = np.argpartition(raw[len(x) :], min(taken, len(x)) - 1)[:taken]
         drawn = x[few[np.argsort(raw[len(x) :][few], kind="stable")]]
-        _, first = np.unique(drawn[:taken], axis=0, return_index=True)
+        _, first = np.unique(drawn, axis=0, return_index=True)
         if len(first) >= options.clusters:
             return order.astype(np.uint32), drawn[np.sort(first)[: options.clusters]]
         if taken >= len(x):
