@@ -8,6 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from sommerl import BrdfTable, Lattice
+from sommerl.errors import SommerlError
 
 SMALL = Lattice(8, 8, 12)
 
@@ -16,6 +17,20 @@ def must_fail(check: Callable[..., Any], *broken: Any) -> None:
     """Runs a check on something broken on purpose: the check has to notice."""
     with pytest.raises(AssertionError):
         check(*broken)
+
+
+def complaint(call: Callable[..., Any], *arguments: Any) -> str | None:
+    """What a call says of bad input; None if it takes it. Any other error than Sommerl's own is let through."""
+    try:
+        call(*arguments)
+    except SommerlError as error:
+        return str(error)
+    return None
+
+
+def check_sentence(message: str | None, name: str) -> None:
+    """One line that names the file, if there is anything to say."""
+    assert message is None or ("\n" not in message and f"{name}" in message)
 
 
 def random_directions(count: int, seed: int = 0) -> NDArray[np.float64]:

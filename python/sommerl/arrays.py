@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 Array = Any  #: a NumPy array or a Dr.Jit array of one number per lane
 Triple = tuple[Array, Array, Array]  #: x, y, z of directions, or r, g, b of reflectances
@@ -33,6 +34,11 @@ class NumpyOps:
         """Entry `index` of a flat buffer; an integer entry as one that can be calculated with, and does not wrap."""
         value = buffer[index]
         return value.astype(np.int64) if value.dtype.kind == "u" else value
+
+    @staticmethod
+    def affine(inputs: list[Array], weights: NDArray[np.float64], bias: NDArray[np.float64]) -> list[Array]:
+        """inputs · weights + bias: weights (inputs, outputs), bias (outputs)."""
+        return list(np.moveaxis(np.stack(inputs, axis=-1) @ weights + bias, -1, 0))
 
 
 @dataclass(frozen=True)
@@ -60,6 +66,12 @@ class DrjitOps:
             return (pair >> ((index & 1) << 4)) & 0xFFFF
         value = self._dr.gather(type(buffer), buffer, index)
         return value if self._dr.is_float_v(value) else type(index)(value)
+
+    def affine(self, inputs: list[Array], weights: NDArray[np.float64], bias: NDArray[np.float64]) -> list[Array]:
+        outputs: list[Array] = []
+        for column, constant in zip(weights.T.tolist(), bias.tolist(), strict=True):
+            outputs.append(sum((x * w for x, w in zip(inputs, column, strict=True)), start=0.0 * inputs[0] + constant))
+        return outputs
 
 
 _NUMPY = NumpyOps()

@@ -20,12 +20,18 @@ from .arrays import Triple, split
 from .lattice import Interpolation, Lattice, checked
 
 Buffers = Mapping[str, Any]
+AT_ONCE = 2**16  # pairs that a formula is evaluated for: bounds memory, and stays in the cache
 
 
 class Brdf(ABC):
     """An isotropic BRDF. A subclass gives one formula, which runs on NumPy and on Dr.Jit arrays."""
 
     name: str
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What a reader has to report of the data, beyond what it is: see the classes in `formats`."""
+        return {}
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name!r})"
@@ -50,7 +56,11 @@ class Brdf(ABC):
         light, viewer = _broadcast(wi, wo)
         above = (light[..., 2] > 0) & (viewer[..., 2] > 0)
         result = np.zeros(light.shape)
-        result[above] = np.stack(self.f_r(split(light[above]), split(viewer[above]), self.buffers()), axis=-1)
+        pairs, buffers = (light[above], viewer[above]), self.buffers()
+        parts = [slice(start, start + AT_ONCE) for start in range(0, len(pairs[0]), AT_ONCE)]
+        values = [np.stack(self.f_r(split(pairs[0][part]), split(pairs[1][part]), buffers), axis=-1) for part in parts]
+        if values:
+            result[above] = np.concatenate(values)
         return result
 
 

@@ -13,7 +13,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, NoReturn, get_args
 
-from . import __version__, commands, demo
+from . import __version__, commands, convert, demo
 from .errors import OptionError, SommerlError
 from .lattice import INTERPOLATIONS
 from .materials import NAMES
@@ -25,7 +25,9 @@ TRAIN_DEFAULTS = TrainOptions()
 DESCRIPTION = """\
 Turns measured reflectance into small material files that render fast and look like the measurement.
 
-A MATERIAL is a MERL table (.binary), a Sommerl material (.smrl), or the name of a built-in one."""
+A MATERIAL is a file, told by its content, or the name of a built-in one. Files: Sommerl's .smrl, MERL .binary,
+RGL .bsdf (isotropic), Cornell .brdf, tables of samples (.csv .npy .npz, with columns theta_i_deg, phi_i_deg,
+theta_o_deg, phi_o_deg, r, g, b), and neural BRDFs (.npy .npz .h5; of an archive with several, FILE.npz:NAME)."""
 
 BUILT_IN = "Built-in materials (SGD stand-ins for measured ones):\n  " + "\n  ".join(
     ", ".join(NAMES[i : i + 5]) for i in range(0, len(NAMES), 5)
@@ -166,13 +168,24 @@ def _info(add: Any) -> None:
 
 
 def _convert(add: Any) -> None:
-    summary = "Converts a material into the format that the output's extension names: .binary (MERL) or .smrl."
-    command = _command(add, "convert", commands.convert, summary, "sommerl convert nickel.smrl nickel.binary")
-    command.add_argument("input", metavar="IN")
-    command.add_argument("output", type=Path, metavar="OUT", help=".smrl uses the defaults of compress")
+    summary = "Converts a material into the format that the output's extension names."
+    example = "sommerl convert samples.csv samples.binary\n  sommerl convert nickel.smrl nickel.h"
+    command = _command(add, "convert", convert.convert, summary, example)
+    command.epilog = f"{_listed(convert.EXTENSIONS)}\n\n{command.epilog}"
+    command.add_argument("input", metavar="IN", help="a material: path or built-in name")
+    command.add_argument("output", type=Path, metavar="OUT", help="a name with one of the extensions below")
+    command.add_argument(
+        "--spectral", action="store_true", help=".bsdf: spectra for pbrt-v4 and Mitsuba's spectral variants, not RGB"
+    )
     command.add_argument(
         "--noise", type=int, metavar="SEED", help="add the measurement error of MERL's data to a built-in material"
     )
+
+
+def _listed(extensions: Mapping[str, str]) -> str:
+    """Extensions, and what is written for each; those with one meaning together."""
+    meanings = {text: " ".join(key for key in extensions if extensions[key] == text) for text in extensions.values()}
+    return "Extensions of OUT:\n" + "\n".join(f"  {keys:24}{text}" for text, keys in meanings.items())
 
 
 def _compare(add: Any) -> None:

@@ -10,12 +10,11 @@ from typing import Any
 
 from . import console
 from .brdf import Brdf, OnLattice
-from .describe import compression_rows, describe, image_rows, label, lookup, table_rows, text, trained
+from .describe import compression_rows, describe, fact_rows, image_rows, label, lookup, table_rows, text, trained
 from .errors import FormatError, OptionError
 from .files import check_writable
-from .formats import merl
-from .load import interpolated, load, load_table
-from .materials import NAMES, builtin_table
+from .formats.names import split_member
+from .load import EXTENSIONS, interpolated, load, load_table
 from .metrics import exposure, table_metrics, to_srgb8
 from .render.compare import compare_on_sphere
 from .render.environment import default_environment, load_environment
@@ -39,7 +38,7 @@ def compress(options: Namespace) -> dict[str, Any]:
         for source in options.inputs:
             load(source)  # so that a bad one is found before hours are spent on the others
     results = [
-        _compress_one(load_table(source), output, train_options, options.json)
+        compress_one(load_table(source), output, train_options, options.json)
         for source, output in zip(options.inputs, outputs, strict=True)
     ]
     return results[0] if len(results) == 1 else {"materials": results}
@@ -56,15 +55,16 @@ def _outputs(inputs: list[str], output: Path) -> list[Path]:
     if len(set(outputs)) < len(outputs):
         raise OptionError("inputs: expected different names, found two that would be written to one file")
     for source, path in zip(inputs, outputs, strict=True):
-        _check_output(path, (".smrl",), source)
+        check_output(path, (".smrl",), source)
     return outputs
 
 
 def _stem(source: str) -> str:
-    return Path(source).name.removesuffix(".binary").removesuffix(".smrl")
+    path, member = split_member(source)
+    return member or (path.stem if path.suffix.lower() in EXTENSIONS else path.name)
 
 
-def _compress_one(table: BrdfTable, output: Path, options: TrainOptions, quiet: bool) -> dict[str, Any]:
+def compress_one(table: BrdfTable, output: Path, options: TrainOptions, quiet: bool) -> dict[str, Any]:
     material, report = trained(table, options)
     written = smrl.save(material, output)
     result = describe(material, written) | asdict(report) | {"epochs": options.epochs, "output": str(output)}
@@ -79,34 +79,18 @@ def info(options: Namespace) -> dict[str, Any]:
     on_disk = path.stat().st_size if path.is_file() else None
     result = describe(brdf, on_disk)
     if not options.json:
-        shown = {key: value for key, value in result.items() if value is not None}
+        shown = {key: value for key, value in result.items() if value is not None and key != "facts"}
         for key in ("bytes_paper", "bytes_memory", "bytes_disk"):
             if key in shown:
                 shown[key] = console.size(shown[key])
-        console.print_rows(str(options.material), {key: text(value) for key, value in shown.items()})
+        rows = {key: text(value) for key, value in shown.items()} | fact_rows(result["facts"] or {})
+        console.print_rows(str(options.material), rows)
     return result
-
-
-def convert(options: Namespace) -> dict[str, Any]:
-    if options.noise is not None and (options.input not in NAMES or Path(options.input).exists()):
-        raise OptionError(f"noise: expected a built-in material, found {options.input}")
-    if options.noise is not None and options.noise < 0:
-        raise OptionError(f"noise: expected a seed of at least 0, found {options.noise}")
-    _check_output(options.output, (".binary", ".smrl"), options.input)
-    table = load_table(options.input) if options.noise is None else builtin_table(options.input, noise=options.noise)
-    if options.output.suffix.lower() == ".smrl":
-        return _compress_one(table, options.output, TrainOptions(), options.json)
-    merl.write(table, options.output)
-    written = options.output.stat().st_size
-    if not options.json:
-        clamped = f", {table.cells_clamped} cells clamped to 0" if table.cells_clamped else ""
-        print(f"{table.name} → {options.output} ({console.size(written)}{clamped})")
-    return {"output": str(options.output), "bytes_disk": written, "cells_clamped": table.cells_clamped}
 
 
 def compare(options: Namespace) -> dict[str, Any]:
     if options.output:
-        _check_output(options.output, (".png",))
+        check_output(options.output, (".png",))
     reference, candidate = _alike(load(options.reference), load(options.candidate), options.lookup)
     environment = _environment(options)
     with console.progress("rendering") as advance:
@@ -135,7 +119,7 @@ def compare(options: Namespace) -> dict[str, Any]:
 
 
 def render(options: Namespace) -> dict[str, Any]:
-    _check_output(options.output, (".png", ".exr"))
+    check_output(options.output, (".png", ".exr"))
     brdf = load(options.material)
     if options.lookup:
         brdf = interpolated(brdf, options.lookup)
@@ -179,7 +163,7 @@ def _sampled(reference: Brdf, candidate: Brdf) -> tuple[BrdfTable, BrdfTable]:
     return first, second
 
 
-def _check_output(path: Path, extensions: tuple[str, ...], source: str = "") -> None:
+def check_output(path: Path, extensions: tuple[str, ...], source: str = "") -> None:
     """Says before long work what would go wrong after it."""
     if path.suffix.lower() not in extensions:
         raise OptionError(f"{path}: expected a name that ends in {' or '.join(extensions)}, found {path.suffix!r}")

@@ -8,6 +8,7 @@ from typing import Any
 
 from . import console
 from .brdf import Brdf, OnLattice
+from .formats.rgl import RglBrdf
 from .metrics import ImageMetrics, table_metrics
 from .som_man.material import SomManBrdf
 from .som_man.options import TrainOptions
@@ -23,7 +24,9 @@ def trained(table: BrdfTable, options: TrainOptions) -> tuple[SomManBrdf, TrainR
         material, report = train(table, options, progress=advance)
     metrics = table_metrics(table.values, material.values, table.lattice)
     measured = asdict(metrics) | {"quantisation_error": report.quantisation_error[-1]}
-    material.metrics = {name: float(f"{value:.{METRICS_DIGITS}g}") for name, value in measured.items()}
+    material.metrics = {name: _rounded(value) for name, value in measured.items()}
+    if table.facts:
+        material.options["source_facts"] = {name: _rounded(value) for name, value in table.facts.items()}
     return material, report
 
 
@@ -31,7 +34,7 @@ def describe(brdf: Brdf, bytes_disk: int | None) -> dict[str, Any]:
     """What `info` says of a material; null where a kind of material has no such thing."""
     known: dict[str, Any] = dict.fromkeys(("clusters", "lattice", "interpolation", "domain", "bytes_paper"))
     known |= dict.fromkeys(("bytes_memory", "options", "metrics", "source_sha256", "cells_clamped"))
-    kind = "model"
+    kind = "measurement" if isinstance(brdf, RglBrdf) else "model"
     if isinstance(brdf, SomManBrdf):
         kind = "som-man"
         known |= {"clusters": brdf.clusters, "domain": "linear", "bytes_paper": brdf.bytes_paper}
@@ -41,8 +44,8 @@ def describe(brdf: Brdf, bytes_disk: int | None) -> dict[str, Any]:
         known |= {"domain": "linear", "bytes_memory": brdf.values.nbytes, "cells_clamped": brdf.cells_clamped}
     if isinstance(brdf, OnLattice):
         known |= {"lattice": list(brdf.lattice.shape), "interpolation": brdf.interpolation}
-        known["source_sha256"] = brdf.source_sha256
-    return {"kind": kind, "name": brdf.name, **known, "bytes_disk": bytes_disk}
+    known["source_sha256"] = getattr(brdf, "source_sha256", None)
+    return {"kind": kind, "name": brdf.name, **known, "facts": brdf.facts or None, "bytes_disk": bytes_disk}
 
 
 def label(brdf: Brdf) -> str:
@@ -53,6 +56,30 @@ def label(brdf: Brdf) -> str:
 def lookup(brdf: Brdf) -> str:
     """How a material is looked up."""
     return brdf.interpolation if isinstance(brdf, OnLattice) else "formula"
+
+
+def _rounded(value: Any) -> Any:
+    return float(f"{value:.{METRICS_DIGITS}g}") if isinstance(value, float) else value
+
+
+FACTS = {
+    "asymmetry": "asymmetry of the data: |f(a, b) − f(b, a)| over the mean",
+    "reciprocal": "both orders averaged",
+    "cells_near_grazing": "MERL cells where a cosine below 0.01 was taken for 0.01",
+    "samples": "samples, at different directions",
+    "samples_at_the_horizon": "samples at the horizon, left out",
+    "mirrored": "one side measured, mirrored to the other",
+    "coverage": "share of the hemispheres within 10° of a sample",
+    "cells_not_measured": "cells farther from all samples, extrapolated",
+    "held_out_log_error_cosine": "every tenth sample held out: RMS error of the logarithm, cosine-weighted",
+    "held_out_median_relative_error": "every tenth sample held out: median relative error",
+}
+
+
+def fact_rows(facts: Mapping[str, Any]) -> dict[str, str]:
+    """What a reader reports, for people."""
+    rows = {FACTS.get(name, name): value for name, value in facts.items()}
+    return {name: f"{value:.3g}" if isinstance(value, float) else str(value) for name, value in rows.items()}
 
 
 def text(value: Any) -> str:
@@ -76,7 +103,7 @@ def compression_rows(material: SomManBrdf, bytes_disk: int, report: TrainReport)
     }
     if report.cells_clamped:
         rows["cells clamped to 0"] = str(report.cells_clamped)
-    return rows | {"training": f"{report.seconds:.1f} s"}
+    return rows | fact_rows(material.facts) | {"training": f"{report.seconds:.1f} s"}
 
 
 def table_rows(metrics: Mapping[str, float]) -> dict[str, str]:

@@ -54,4 +54,10 @@ def directions(theta_h: Array, theta_d: Array, phi_d: Array) -> tuple[Triple, Tr
     return wi, wo
 
 
+def spherical(theta: Array, phi: Array) -> Triple:
+    """The unit direction at polar angle θ from the normal and azimuth φ [rad]."""
+    f = ops(theta)
+    return f.sin(theta) * f.cos(phi), f.sin(theta) * f.sin(phi), f.cos(theta)
+
+
 TWO_PI = 6.283185307179586

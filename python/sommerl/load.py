@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 
 from .brdf import Brdf, OnLattice
 from .errors import FormatError, MaterialError
-from .formats import merl
+from .formats import arrays_on_disk, cornell, merl, nbrdf, rgl, samples
+from .formats.names import split_member
 from .lattice import Interpolation
 from .materials import NAMES, builtin
 from .som_man import file as smrl
 from .table import BrdfTable
 
-HEAD_BYTES = 12
+HEAD_BYTES = 4096
+EXTENSIONS = (".smrl", ".binary", ".bsdf", ".brdf", ".csv", ".npy", ".npz", ".h5", ".hdf5")  # what `load` reads
 
 
 def load(source: str | Path) -> Brdf:
-    """The material in a file (MERL table or .smrl), or the built-in one of that name.
+    """The material in a file of any known format, told by its content, or the built-in one of that name.
 
-    Raises FormatError for a file in no known format, MaterialError for a name that is neither file nor built-in.
+    Of an archive of neural BRDFs, "FILE.npz:NAME" is one. Raises FormatError for a file in no known format,
+    MaterialError for a name that is neither file nor built-in.
     """
-    path = Path(source)
+    path, member = split_member(source)
     if str(source) in NAMES and not path.is_file():
         return builtin(str(source))
     if not path.exists():
@@ -34,13 +38,52 @@ def load(source: str | Path) -> Brdf:
             head = stream.read(HEAD_BYTES)
         if not head:
             raise FormatError(f"{path}: expected a material file, found an empty one")
-        if smrl.looks_like(head):
-            return smrl.load(path)
-        if merl.looks_like(head) or path.suffix == ".binary":
-            return merl.read(path)
+        return _read(path, head, member)
     except OSError as error:
-        raise FormatError(f"{path}: cannot be read ({error.strerror})") from error
-    raise FormatError(f"{path}: expected a MERL table (.binary) or a Sommerl material (.smrl), found neither")
+        raise FormatError(f"{path}: cannot be read ({error.strerror or error})") from error
+
+
+def _read(path: Path, head: bytes, member: str) -> Brdf:
+    """The material in a file that starts with `head`."""
+    if member and not head.startswith(arrays_on_disk.ZIP_MAGIC):
+        raise FormatError(f"{path}: expected an archive of materials, to take {member} from it, found one material")
+    if smrl.looks_like(head):
+        return smrl.load(path)
+    if rgl.looks_like(head):
+        return rgl.read(path)
+    if head.startswith(nbrdf.HDF5_MAGIC):
+        return nbrdf.read(path)
+    if head.startswith((arrays_on_disk.MAGIC, arrays_on_disk.ZIP_MAGIC)):
+        return _numpy(path, member)
+    if merl.looks_like(head):
+        return merl.read(path)
+    if cornell.looks_like(head):
+        return cornell.read(path)
+    if samples.looks_like(head):
+        return samples.read(path)
+    return _named(path)
+
+
+def _numpy(path: Path, member: str) -> Brdf:
+    """Samples or a neural BRDF, whichever the arrays are."""
+    if zipfile.is_zipfile(path):
+        sampled = samples.are_columns(arrays_on_disk.read_npz(path))
+    else:
+        array = arrays_on_disk.read_npy(path)
+        sampled = bool(array.dtype.names) or (array.ndim == 2 and array.shape[1] == len(samples.COLUMNS))
+    return samples.read(path) if sampled else nbrdf.read(path, member)
+
+
+def _named(path: Path) -> Brdf:
+    """A file whose content says nothing: its reader, by its name, says what is wrong with it."""
+    reader = {".binary": merl.read, ".bsdf": rgl.read, ".brdf": cornell.read, ".csv": samples.read}
+    reader |= dict.fromkeys((".npy", ".npz", ".h5", ".hdf5"), nbrdf.read)
+    if path.suffix.lower() in reader:
+        return reader[path.suffix.lower()](path)
+    raise FormatError(
+        f"{path}: expected a material (.smrl, MERL .binary, RGL .bsdf, Cornell .brdf, samples .csv .npy .npz, neural "
+        "BRDF .npy .npz .h5), found none of these"
+    )
 
 
 def interpolated(brdf: Brdf, interpolation: Interpolation) -> Brdf:

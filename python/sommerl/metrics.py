@@ -5,16 +5,15 @@ Image metrics judge what a viewer sees: 8-bit sRGB pixels at an exposure taken f
 
 from __future__ import annotations
 
-import importlib
-import warnings
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import MaterialError, MissingDependencyError
+from .errors import MaterialError
 from .lattice import Lattice
+from .optional import optional
 
 EXPOSURE_PERCENTILE, EXPOSED_TO = 90, 0.6
 LOG_FLOOR = 1e-3  # [1/sr]: reflectances well below it count as black in the log error
@@ -106,14 +105,14 @@ def psnr(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float:
 
 def ssim(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: Mask) -> float:
     """Mean structural similarity over the mask."""
-    kept: Any = _kept("skimage.metrics", "scikit-image")
+    kept = optional("skimage.metrics", "scikit-image", "image metrics", "render")
     _, similarity = kept.structural_similarity(a, b, channel_axis=-1, data_range=255, full=True)
     return float(similarity[mask].mean())
 
 
 def delta_e_itp(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: Mask) -> float:
     """Mean ΔE_ITP over the mask."""
-    kept: Any = _kept("colour", "colour-science")
+    kept = optional("colour", "colour-science", "image metrics", "render")
 
     def ictcp(image: NDArray[np.uint8]) -> Any:
         linear = kept.cctf_decoding(image[mask] / 255.0, function="sRGB")
@@ -126,17 +125,8 @@ def delta_e_itp(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: Mask) -> float
 
 def flip(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: Mask) -> float:
     """Mean ꟻLIP over the mask, at the tool's default viewing distance (67 pixels per degree)."""
-    kept: Any = _kept("flip_evaluator", "flip-evaluator")
+    kept = optional("flip_evaluator", "flip-evaluator", "image metrics", "render")
     difference, _, _ = kept.evaluate(
         (a / 255.0).astype(np.float32), (b / 255.0).astype(np.float32), "LDR", applyMagma=False, computeMeanError=False
     )
     return float(np.asarray(difference)[..., 0][mask].mean())
-
-
-def _kept(module: str, package: str) -> Any:
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # colour-science tells everybody that it could plot, too
-            return importlib.import_module(module)
-    except ImportError as error:
-        raise MissingDependencyError(f"image metrics need {package}: install sommerl[render]") from error

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -26,6 +28,8 @@ class BrdfTable(OnLattice):
 
     Raises MaterialError if the shape is not the lattice's, or nothing above the horizon is positive.
     """
+
+    source_facts: Mapping[str, Any] = MappingProxyType({})  #: `facts` of what the table was sampled from
 
     def __init__(
         self,
@@ -66,8 +70,13 @@ class BrdfTable(OnLattice):
         if isinstance(brdf, BrdfTable):
             return brdf
         table = cls.sample(brdf, getattr(brdf, "lattice", MERL))
+        table.source_facts = brdf.facts
         table.source_sha256 = getattr(brdf, "source_sha256", table.source_sha256)
         return table
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        return dict(self.source_facts)
 
     def cells(self) -> tuple[None, NDArray[np.float64]]:
         return None, self.values

@@ -7,16 +7,17 @@ data that is not reciprocal.
 from __future__ import annotations
 
 import hashlib
-import os
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..brdf import Brdf
 from ..errors import FormatError, MaterialError
 from ..files import atomic_write
 from ..lattice import Lattice
 from ..table import BrdfTable
+from .names import printable
 
 LATTICES: dict[tuple[int, ...], Lattice] = {
     (90, 90, 180): Lattice(),
@@ -27,12 +28,21 @@ HEADER_BYTES = 12
 BELOW_HORIZON = -1.0  # what the stored planes hold where nothing can be measured
 
 
+class MerlTable(BrdfTable):
+    """A table from a MERL file. planes: what the file holds, of shape (3,) + the lattice's.
+
+    Scaling to f_r and back is not exact; with these numbers, what was not changed is written as it was read.
+    """
+
+    planes: NDArray[np.float64]
+
+
 def looks_like(head: bytes) -> bool:
     """Whether a file that starts with these 12 bytes says that it is a MERL table."""
     return len(head) >= HEADER_BYTES and _dimensions(head) in LATTICES
 
 
-def read(path: str | Path) -> BrdfTable:
+def read(path: str | Path) -> MerlTable:
     """The table in a MERL file. Raises FormatError if it is not one, MaterialError if nothing in it is positive."""
     path = Path(path)
     length = path.stat().st_size
@@ -50,12 +60,12 @@ def read(path: str | Path) -> BrdfTable:
     data = path.read_bytes()
     digest = hashlib.sha256(data).hexdigest()
     planes = np.frombuffer(data, "<f8", offset=HEADER_BYTES).reshape(3, *lattice.shape)
-    values = np.moveaxis(planes, 0, -1) * SCALE
-    del data, planes
     try:
-        return BrdfTable(values, lattice, name=_printable(path.stem), source_sha256=digest)
+        table = MerlTable(_scaled(planes), lattice, name=printable(path.stem), source_sha256=digest)
     except MaterialError as error:
         raise MaterialError(f"{path}: {error}") from error
+    table.planes = planes
+    return table
 
 
 def bytes_on_disk(lattice: Lattice) -> int:
@@ -63,15 +73,29 @@ def bytes_on_disk(lattice: Lattice) -> int:
     return HEADER_BYTES + 3 * 8 * lattice.size
 
 
+def resampled(brdf: Brdf) -> BrdfTable:
+    """The BRDF as a table on a lattice of MERL's: itself if it is one, else its values at the centres of the cells."""
+    table = BrdfTable.of(brdf)
+    return table if table.lattice in LATTICES.values() else BrdfTable.sample(brdf)
+
+
 def write(table: BrdfTable, path: str | Path) -> None:
     """Writes a table in MERL's format. Raises FormatError if it has another lattice."""
     if table.lattice not in LATTICES.values():
         raise FormatError(f"{path}: expected a MERL lattice, found {table.lattice}")
     stored = np.where(_reachable(table.lattice)[..., None], table.values / SCALE, BELOW_HORIZON)
+    if isinstance(table, MerlTable):
+        original, above = np.moveaxis(table.planes, 0, -1), table.lattice.above_horizon[..., None]
+        np.copyto(stored, original, where=~above | (table.values == _scaled(table.planes)))
     with atomic_write(Path(path)) as out:
         out.write(np.array(table.lattice.shape, "<i4").tobytes())
         for channel in range(3):
             out.write(stored[..., channel].astype("<f8").tobytes())
+
+
+def _scaled(planes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """f_r of a file's planes, of the lattice's shape + (3,)."""
+    return np.moveaxis(planes, 0, -1) * SCALE
 
 
 def _reachable(lattice: Lattice) -> NDArray[np.bool_]:
@@ -81,11 +105,6 @@ def _reachable(lattice: Lattice) -> NDArray[np.bool_]:
     edges = np.abs(np.cos(np.arange(lattice.phi_d + 1) / lattice.phi_d * lattice.phi_d_range))
     tilt = np.sin(theta_h)[:, None, None] * np.sin(theta_d)[:, None] * np.minimum(edges[1:], edges[:-1])
     return np.cos(theta_h)[:, None, None] * np.cos(theta_d)[:, None] > tilt
-
-
-def _printable(name: str) -> str:
-    """A file's name without the bytes that are not text."""
-    return os.fsencode(name).decode("utf-8", "replace")
 
 
 def _dimensions(head: bytes) -> tuple[int, ...]:

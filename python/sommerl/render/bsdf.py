@@ -36,8 +36,11 @@ def register() -> None:
 
 def _from_properties(props: Any) -> Any:
     name = str(props["filename"])
-    found = str(mitsuba().file_resolver().resolve(name))
-    brdf = load(found if Path(found).is_file() else name)
+    # Of "FILE:MEMBER", only the file is to be found; a colon may also be part of its name.
+    resolve = mitsuba().file_resolver().resolve
+    places = [(name, "")] + [(name[:at], name[at:]) for at, character in enumerate(name) if character == ":"]
+    found = next((f"{place}{rest}" for file, rest in places if (place := Path(str(resolve(file)))).is_file()), name)
+    brdf = load(found)
     if "interpolation" in props:
         brdf = interpolated(brdf, props["interpolation"])
     return _plugin()(props, brdf, BlinnPhongSampler.fitted(brdf))

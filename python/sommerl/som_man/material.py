@@ -55,6 +55,11 @@ class SomManBrdf(OnLattice):
         self._index = lattice.extended(index.astype(np.uint8 if len(self.lut) <= 256 else np.uint16))
 
     @property
+    def facts(self) -> dict[str, Any]:
+        """Those of what was compressed."""
+        return dict(self.options.get("source_facts", {}))
+
+    @property
     def index(self) -> NDArray[Any]:
         """The LUT entry of each cell, of the lattice's shape, uint8 or uint16; 0 below the horizon."""
         return np.where(self.lattice.above_horizon, self._index, self._index.dtype.type(0))

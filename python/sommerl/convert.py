@@ -1,0 +1,107 @@
+"""The command `convert`: a material in any known format to one that somebody else reads."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+from . import console
+from .brdf import Brdf
+from .commands import check_output, compress_one
+from .describe import fact_rows, trained
+from .errors import OptionError
+from .formats import merl, rgl_export, scene, shader
+from .formats.scattered import ScatteredTable
+from .load import load
+from .materials import NAMES, builtin_table
+from .plots import coverage
+from .som_man.material import SomManBrdf
+from .som_man.options import TrainOptions
+from .table import BrdfTable
+
+EXTENSIONS = {
+    ".smrl": "Sommerl, with the defaults of compress",
+    ".binary": "MERL",
+    ".bsdf": "RGL, for the `measured` materials of Mitsuba and pbrt-v4",
+    **dict.fromkeys(shader.LANGUAGES, "source code with an eval, compressed first if need be"),
+    ".xml": "Mitsuba scene snippet that loads IN",
+    ".json": "the same for load_dict",
+}
+
+SNIPPETS = (".xml", ".json")
+MOSTLY = 0.5
+
+
+def convert(options: Namespace) -> dict[str, Any]:
+    _check(options)
+    brdf = load(options.input) if options.noise is None else builtin_table(options.input, noise=options.noise)
+    output: Path = options.output
+    extension = output.suffix.lower()
+    report = {} if extension in SNIPPETS else _report(brdf, output)
+    if extension == ".smrl":
+        result = compress_one(BrdfTable.of(brdf), output, TrainOptions(), options.json)
+    else:
+        written = _write(brdf, options, extension)
+        size = output.stat().st_size
+        result = {"output": str(output), "bytes_disk": size, "cells_clamped": getattr(written, "cells_clamped", None)}
+        if not options.json:
+            clamped = f", {result['cells_clamped']} cells clamped to 0" if result["cells_clamped"] else ""
+            print(f"{written.name} → {output} ({console.size(size)}{clamped})")
+    if not options.json:
+        _print_report(report if extension != ".smrl" else report | {"facts": {}})
+    return result | report
+
+
+def _check(options: Namespace) -> None:
+    """Raises OptionError for what cannot be asked for."""
+    if options.noise is not None and (options.input not in NAMES or Path(options.input).exists()):
+        raise OptionError(f"noise: expected a built-in material, found {options.input}")
+    if options.noise is not None and options.noise < 0:
+        raise OptionError(f"noise: expected a seed of at least 0, found {options.noise}")
+    extension = options.output.suffix.lower()
+    if options.spectral and extension != ".bsdf":
+        raise OptionError(f"spectral: expected an output that ends in .bsdf, found {options.output}")
+    if extension in SNIPPETS and options.noise is not None:
+        raise OptionError("noise: expected an output that holds the material, found a scene snippet")
+    check_output(options.output, tuple(EXTENSIONS), options.input)
+
+
+def _write(brdf: Brdf, options: Namespace, extension: str) -> Brdf:
+    """Writes a material; returns what it was turned into for that."""
+    output: Path = options.output
+    if extension == ".binary":
+        table = merl.resampled(brdf)
+        merl.write(table, output)
+        return table
+    if extension == ".bsdf":
+        rgl_export.write(brdf, output, spectral=options.spectral)
+        return brdf
+    if extension in shader.LANGUAGES:
+        material = brdf if isinstance(brdf, SomManBrdf) else trained(BrdfTable.of(brdf), TrainOptions())[0]
+        shader.write(material, output)
+        return material
+    scene.write(options.input, output)
+    return brdf
+
+
+def _report(brdf: Brdf, output: Path) -> dict[str, Any]:
+    """What the data lacks; and, written before anything else, a picture of where samples were missing."""
+    facts = brdf.facts
+    result: dict[str, Any] = {"facts": facts} if facts else {}
+    if isinstance(brdf, ScatteredTable):
+        result["coverage"] = facts["coverage"]
+        picture = output.with_name(f"{output.stem}.coverage.png")
+        check_output(picture, (".png",))
+        coverage(brdf, picture)
+        result["coverage_image"] = str(picture)
+    return result
+
+
+def _print_report(report: dict[str, Any]) -> None:
+    for name, value in fact_rows(report.get("facts", {})).items():
+        print(f"  {name}: {value}")
+    if report.get("coverage", 1) < MOSTLY:
+        print("  warning: most of this material is extrapolated")
+    if "coverage_image" in report:
+        print(f"  where samples were missing: {report['coverage_image']}")

@@ -1,0 +1,58 @@
+"""Pictures of data."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .arrays import split
+from .files import atomic_write
+from .formats.scattered import REACH, ScatteredTable
+from .half_diff import half_diff, spherical
+from .optional import optional
+
+INCIDENCES = (10, 45, 75)  # degrees
+
+
+def coverage(table: ScatteredTable, path: Path) -> None:
+    """Writes a PNG of which directions were measured: the share of φ_d over θ_h and θ_d, and the hemisphere of `wo` for
+    three elevations of `wi`. Raises MissingDependencyError without matplotlib."""
+    figures = optional("matplotlib.figure", "matplotlib", "plots", "formats")
+    figure = figures.Figure(figsize=(13, 3.6), layout="constrained")
+    share = f"{table.facts['coverage']:.1%} of the lattice (by solid angle and cosines)"
+    figure.suptitle(
+        f"{table.name}: {len(table.samples.wi)} samples; {share} within {np.degrees(REACH):.0f}° of one (yellow)",
+        fontsize=11,
+    )
+    _slices(figure.add_subplot(1, 4, 1), table)
+    for k, incidence in enumerate(INCIDENCES):
+        _hemisphere(figure.add_subplot(1, 4, k + 2, projection="polar"), table, incidence)
+    with atomic_write(path) as out:
+        figure.savefig(out, format="png", dpi=110)
+
+
+def _slices(ax: Any, table: ScatteredTable) -> None:
+    above = table.lattice.above_horizon
+    with np.errstate(invalid="ignore"):
+        share = (table.measured & above).sum(axis=2) / above.sum(axis=2)  # NaN, shown as nothing, below the horizon
+    image = ax.imshow(share, origin="lower", extent=(0, 90, 0, 1), aspect="auto", cmap="viridis", vmin=0, vmax=1)
+    theta_h, theta_d, _ = half_diff(split(table.samples.wi), split(table.samples.wo))
+    ax.plot(np.degrees(theta_d), np.sqrt(theta_h * 2 / np.pi), ".", color="white", markersize=1.5, alpha=0.5)
+    ticks = np.array([0, 1, 5, 15, 30, 50, 90])
+    ax.set_yticks(np.sqrt(ticks / 90), [f"{tick}°" for tick in ticks])
+    ax.set(xlabel="θ_d [°]", ylabel="θ_h", title="share of φ_d", xlim=(0, 90), ylim=(0, 1))
+    ax.figure.colorbar(image, ax=ax)
+
+
+def _hemisphere(ax: Any, table: ScatteredTable, incidence: int) -> None:
+    edges = np.linspace(0, np.pi / 2, 46), np.linspace(-np.pi, np.pi, 121)
+    theta, phi = np.meshgrid(*((edge[1:] + edge[:-1]) / 2 for edge in edges), indexing="ij")
+    angle = np.radians(incidence)
+    wi, wo = spherical(np.full_like(theta, angle), np.zeros_like(phi)), spherical(theta, phi)
+    cell = table.lattice.cell(*half_diff(wi, wo, table.lattice.reciprocal))
+    measured = table.measured.reshape(-1)[cell].astype(float)
+    ax.pcolormesh(edges[1], edges[0], measured, cmap="viridis", vmin=0, vmax=1)
+    ax.plot([0], [angle], "x", color="red")
+    ax.set(title=f"θ_i = {incidence}° (×)", yticks=[], ylim=(0, np.pi / 2))

@@ -1,0 +1,84 @@
+"""Readers and writers on measured data: goals, not measured bests."""
+
+import statistics
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers import random_directions
+
+from sommerl import BrdfTable, load
+from sommerl.brdf import Brdf
+from sommerl.formats import rgl, rgl_export
+from sommerl.render.compare import compare_on_sphere
+from sommerl.render.environment import default_environment
+from sommerl.render.llvm import drjit, mitsuba
+
+DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+RGL = sorted((DATA / "rgl").glob("*.bsdf"))
+STAND_INS = (
+    "blue-metallic-paint", "yellow-matte-plastic", "nickel", "purple-paint", "green-metallic-paint", "beige-fabric",
+)  # fmt: skip
+A, B = (w[w[:, 2] >= 0.05][:10_000].astype("f4").astype("f8") for w in (random_directions(12_000, s) for s in (1, 2)))
+
+
+@pytest.mark.parametrize("path", RGL, ids=lambda path: path.stem)
+def test_rgl_as_mitsuba_evaluates_it(path):
+    """Within a thousandth, but for values below 1e-4, where Mitsuba's single precision is felt."""
+    mi, dr = mitsuba(), drjit()
+    bsdf = mi.load_dict({"type": "measured", "filename": str(path)})
+    si = dr.zeros(mi.SurfaceInteraction3f, len(B))
+    si.wi = mi.Vector3f(*B.T.astype(np.float32))
+    theirs = np.array(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(*A.T.astype(np.float32)))).T
+    ours = rgl.read(path, reciprocal=False).eval(A, B) * A[:, 2:]
+    assert np.all(np.abs(ours - theirs) <= 1e-3 * np.abs(theirs) + 1e-7)
+
+
+class InMitsuba(Brdf):
+    """Mitsuba's own BSDF of a file, for the same sampler and the same directions."""
+
+    def __init__(self, path):
+        self.name, self._path = "measured", str(path)
+
+    def f_r(self, wi, wo, buffers):
+        mi, dr = mitsuba(), drjit()
+        si = dr.zeros(mi.SurfaceInteraction3f, dr.width(wi[0]))
+        si.wi = mi.Vector3f(*wo)
+        bsdf = mi.load_dict({"type": "measured", "filename": self._path})
+        value = bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(*wi)) / wi[2]
+        return value.x, value.y, value.z
+
+
+def psnr(reference, candidate):
+    return compare_on_sphere(reference, [candidate], default_environment())[0].metrics.psnr_object_db
+
+
+def test_rgl_as_a_table():
+    found = [psnr(source, BrdfTable.sample(source)) for source in map(load, RGL)]
+    assert statistics.mean(found) >= 50
+    assert min(found) >= 36
+
+
+@pytest.mark.parametrize("name", STAND_INS)
+def test_stand_ins_as_rgl_files(stand_in, tmp_path, name):
+    source = load(stand_in(name))
+    rgl_export.write(source, tmp_path / "x.bsdf")
+    assert psnr(source, rgl.read(tmp_path / "x.bsdf", reciprocal=False)) >= 45
+    assert psnr(source, InMitsuba(tmp_path / "x.bsdf")) >= 45
+
+
+@pytest.mark.parametrize("name", ["acryl_blue", "cayman", "mystique"])
+def test_cornell(name):
+    table = load(DATA / "cornell" / f"{name}.brdf")
+    assert table.facts["samples"] == 1439
+    assert table.facts["mirrored"]
+    assert table.facts["held_out_median_relative_error"] < 0.15
+    wi, wo = random_directions(1000, 1), random_directions(1000, 2)
+    assert np.allclose(table.eval(wi, wo), table.eval(wo, wi), rtol=1e-12)
+
+
+def test_neural_fits_are_the_stand_ins(stand_in):
+    table = load(stand_in("nickel"))
+    network = BrdfTable.sample(load(f"{DATA / 'nbrdf' / 'merl.npz'}:nickel"))
+    above = table.lattice.above_horizon
+    assert np.allclose(network.values[above], table.values[above], rtol=1e-6, atol=1e-9)

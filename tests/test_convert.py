@@ -1,0 +1,194 @@
+"""`sommerl convert`, and the loading of every format by its content."""
+
+import json
+
+import numpy as np
+import pytest
+from helpers import lambertian_table, must_fail, random_directions
+from rgl_files import content
+
+from sommerl import BrdfTable, Lattice, TrainOptions, builtin, commands, load, save, train
+from sommerl.cli import main
+from sommerl.formats import merl
+
+A, B = (w[w[:, 2] > 0.1][:200] for w in (random_directions(300, s) for s in (1, 2)))
+
+
+def run_json(capsys, *arguments):
+    assert main([*map(str, arguments), "--json"]) == 0
+    captured = capsys.readouterr()
+    return json.loads(captured.out)
+
+
+@pytest.fixture
+def samples(tmp_path):
+    brdf = builtin("red-fabric")
+    angles = [np.degrees(x) for w in (A, B) for x in (np.arccos(w[:, 2]), np.arctan2(w[:, 1], w[:, 0]))]
+    rows = np.column_stack([*angles, brdf.eval(A, B)])
+    path = tmp_path / "fabric.csv"
+    header = "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,r,g,b"
+    np.savetxt(path, rows, delimiter=",", header=header, comments="")
+    return path
+
+
+def test_samples_to_a_table_and_a_picture(capsys, samples, tmp_path):
+    result = run_json(capsys, "convert", samples, tmp_path / "out.binary")
+    assert result["facts"]["samples"] == len(A)
+    assert 0 < result["facts"]["coverage"] <= 1
+    assert result["coverage_image"] == str(tmp_path / "out.coverage.png")
+    assert (tmp_path / "out.coverage.png").read_bytes().startswith(b"\x89PNG")
+    found, true = load(tmp_path / "out.binary").eval(A, B), builtin("red-fabric").eval(A, B)
+    assert np.median(np.abs(found - true) / true) < 0.05
+
+
+def test_a_picture_that_cannot_be_written_is_told_first(capsys, samples, tmp_path):
+    (tmp_path / "out.coverage.png").mkdir()
+    assert main(["convert", str(samples), str(tmp_path / "out.binary")]) == 1
+    assert "out.coverage.png: expected a file to write, found a directory" in capsys.readouterr().err
+    assert not (tmp_path / "out.binary").exists()
+
+
+def test_what_was_not_measured_is_remembered(capsys, samples, tmp_path):
+    assert main(["convert", str(samples), str(tmp_path / "out.smrl")]) == 0
+    assert "share of the hemispheres within 10° of a sample" in capsys.readouterr().out
+    facts = run_json(capsys, "info", tmp_path / "out.smrl")["facts"]
+    assert facts["samples"] == len(A)
+    assert 0 < facts["coverage"] <= 1
+    assert run_json(capsys, "info", samples)["facts"]["coverage"] == pytest.approx(facts["coverage"], rel=1e-5)
+
+
+def test_mostly_extrapolated(capsys, tmp_path):
+    """All of it within 30° of the normal."""
+    header = "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,r,g,b"
+    rows = [(i, 0, o, phi, 1, 1, 1) for i in (5, 15, 30) for o in (5, 15, 30) for phi in range(0, 180, 30)]
+    np.savetxt(tmp_path / "x.csv", rows, delimiter=",", header=header)
+    assert main(["convert", str(tmp_path / "x.csv"), str(tmp_path / "x.binary")]) == 0
+    assert "warning: most of this material is extrapolated" in capsys.readouterr().out
+
+
+def test_names_of_outputs(capsys, tmp_path):
+    (tmp_path / "x.bsdf").write_bytes(content())
+    assert commands._outputs([str(tmp_path / "x.bsdf"), "nickel"], tmp_path) == [
+        tmp_path / "x.smrl",
+        tmp_path / "nickel.smrl",
+    ]
+
+
+def test_for_people_too(capsys, samples, tmp_path):
+    assert main(["convert", str(samples), str(tmp_path / "out.bsdf")]) == 0
+    text = capsys.readouterr().out
+    assert "share of the hemispheres within 10° of a sample: 0." in text
+    assert "where samples were missing: " in text
+    assert "fabric → " in text
+
+
+def test_rgl_to_merl(capsys, tmp_path):
+    (tmp_path / "x.bsdf").write_bytes(content())
+    result = run_json(capsys, "convert", tmp_path / "x.bsdf", tmp_path / "x.binary")
+    assert result["facts"]["asymmetry"] > 0
+    assert result["cells_clamped"] == 0
+    assert result["bytes_disk"] == 34_992_012
+    info = run_json(capsys, "info", tmp_path / "x.bsdf")
+    assert info["kind"] == "measurement"
+    assert info["facts"] == result["facts"]
+    assert len(info["source_sha256"]) == 64
+
+
+@pytest.mark.parametrize("extension", ["h", "hpp", "glsl", "hlsl"])
+def test_source_code(capsys, tmp_path, extension):
+    material, _ = train(lambertian_table(), TrainOptions(clusters=1, epochs=1))
+    save(material, tmp_path / "x.smrl")
+    result = run_json(capsys, "convert", tmp_path / "x.smrl", tmp_path / f"my grey.{extension}")
+    text = (tmp_path / f"my grey.{extension}").read_text()
+    assert "material_my_grey" in text
+    assert result["bytes_disk"] == len(text.encode())
+
+
+def test_source_code_of_what_is_not_compressed_yet(capsys, tmp_path, monkeypatch):
+    small = BrdfTable.sample(builtin("nickel"), Lattice(20, 20, 20))
+    monkeypatch.setattr("sommerl.convert.BrdfTable.of", lambda brdf: small)
+    run_json(capsys, "convert", "nickel", tmp_path / "nickel.h")
+    assert "material_nickel" in (tmp_path / "nickel.h").read_text()
+
+
+def test_snippets(capsys, tmp_path):
+    run_json(capsys, "convert", "nickel", tmp_path / "x.xml")
+    assert 'type="sommerl"' in (tmp_path / "x.xml").read_text()
+    run_json(capsys, "convert", "nickel", tmp_path / "x.json")
+
+
+def test_spectral(capsys, tmp_path):
+    run_json(capsys, "convert", "red-fabric", tmp_path / "x.bsdf", "--spectral")
+    assert np.allclose(load(tmp_path / "x.bsdf").eval(A, B), builtin("red-fabric").eval(A, B), rtol=0.2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["nickel", "{}/x.h", "--spectral"], "spectral: expected an output that ends in .bsdf"),
+        (["nickel", "{}/x.xml", "--noise", "1"], "noise: expected an output that holds the material"),
+        (["nickel", "{}/x"], "expected a name that ends in"),
+    ],
+)
+def test_bad_options(capsys, tmp_path, arguments, sentence):
+    assert main(["convert", *(argument.format(tmp_path) for argument in arguments)]) == 2
+    assert sentence in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_content_and_not_the_extension_tells(tmp_path):
+    (tmp_path / "x.binary").write_bytes(content())
+    assert load(tmp_path / "x.binary").name == "x"
+    merl.write(BrdfTable.sample(builtin("red-fabric")), tmp_path / "y.bsdf")
+    assert isinstance(load(tmp_path / "y.bsdf"), BrdfTable)
+
+
+@pytest.mark.parametrize(
+    "name", ["x.binary", "x.bsdf", "x.brdf", "x.csv", "x.npy", "x.npz", "x.h5", "x.smrl", "x.txt", "x"]
+)
+@pytest.mark.parametrize("data", [b"\0", b"hello", bytes(range(256)), b"\xff" * 100, "θ\n".encode(), b"\n\n\n"])
+def test_what_is_no_material_gets_a_sentence(capsys, tmp_path, name, data):
+    path = tmp_path / name
+    path.write_bytes(data)
+    assert main(["info", str(path)]) == 1
+    message = capsys.readouterr().err
+    assert message.startswith(f"error: {path}: ")
+    assert "expected" in message
+    assert message.count("\n") == 1
+
+
+def planes(bins=180):
+    """What a MERL file may hold: numbers that scaling does not keep, and anything below the horizon."""
+    rng = np.random.default_rng(7)
+    return rng.lognormal(0, 3, (3, 90, 90, bins))
+
+
+def check_same_bytes(one, other):
+    assert one.read_bytes() == other.read_bytes()
+
+
+@pytest.mark.parametrize("bins", [180, 360])
+def test_merl_to_merl_is_byte_identical(capsys, tmp_path, bins):
+    source, target = tmp_path / "a.binary", tmp_path / "b.binary"
+    stored = planes(bins)
+    source.write_bytes(np.array(stored.shape[1:], "<i4").tobytes() + stored.tobytes())
+    run_json(capsys, "convert", source, target)
+    check_same_bytes(source, target)
+    table = load(source)
+    merl.write(BrdfTable(table.values, table.lattice), target)  # without the file's own numbers
+    must_fail(check_same_bytes, source, target)
+
+
+def test_what_was_clamped_or_changed_is_written_anew(tmp_path):
+    stored = planes()
+    stored[1, 20, 10, 90] = -5.0
+    source = tmp_path / "a.binary"
+    source.write_bytes(np.array(stored.shape[1:], "<i4").tobytes() + stored.tobytes())
+    table = merl.read(source)
+    assert table.cells_clamped == 1
+    table.values[3, 4, 5] *= 2
+    merl.write(table, tmp_path / "b.binary")
+    again = np.frombuffer((tmp_path / "b.binary").read_bytes(), "<f8", offset=12).reshape(stored.shape)
+    assert again[1, 20, 10, 90] == 0
+    assert again[0, 3, 4, 5] == pytest.approx(2 * stored[0, 3, 4, 5])
+    assert (again != stored).sum() == 4
