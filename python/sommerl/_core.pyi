@@ -77,3 +77,25 @@ def lookup(
     values: flat triples, of the cells, or of a LUT if `index` has its entry for each cell. Angles are within 4 ulp of
     NumPy's, so that a pair on the very edge of a cell may fall on the other side.
     """
+
+def lookup_nodes(
+    wi: NDArray[np.float64],
+    wo: NDArray[np.float64],
+    theta_h: list[int],
+    band: list[int],
+    theta_d: list[list[int]],
+    phi_d: list[list[int]],
+    gains: NDArray[np.float64],
+    shapes: NDArray[np.float64],
+    gain: NDArray[np.uint16],
+    shape: NDArray[np.uint16],
+    scale: float,
+    simd: str | None = None,
+    threads: int | None = None,
+) -> NDArray[np.float64]:
+    """f_r (n, 3) of pairs of unit directions (n, 3), as `Brdf.eval` gives it for a `FittedTable` of such values.
+
+    theta_h, band, theta_d, phi_d: the fields of the `NodeLattice`. gains (G,), shapes (S, 3), gain (nodes,) and
+    shape (nodes,): y of a node is gains[gain] · shapes[shape]. simd and threads change nothing but the time. Raises
+    ValueError for what does not fit.
+    """

@@ -4,8 +4,23 @@
 use crate::simd::Path;
 
 /// Pairs calculated together, stage by stage, in loops that vectorise.
-const BATCH: usize = 64;
+pub const BATCH: usize = 64;
 type Batch = [f64; BATCH];
+/// Numbers of a batch that one stage leaves to the next.
+pub type Room = [Batch; 4];
+
+/// What pairs of directions are evaluated for.
+pub trait Material: Sync {
+    /// Writes f_r of up to BATCH pairs; zeros where one is below the horizon. Every element is written. To be inlined
+    /// always: it is compiled once for each instruction set.
+    fn batch(&self, pairs: &Pairs, room: &mut Room, out: &mut [[f64; 3]]);
+}
+
+/// Cells on a lattice.
+pub struct OnLattice<'a> {
+    pub lattice: Lattice,
+    pub cells: Cells<'a>,
+}
 
 /// The lattice, and how to look up in it.
 #[derive(Clone, Copy)]
@@ -38,42 +53,118 @@ impl Cells<'_> {
 pub fn eval(
     wi: &[[f64; 3]],
     wo: &[[f64; 3]],
-    lattice: Lattice,
-    cells: Cells,
+    material: &impl Material,
     path: Path,
     threads: usize,
     out: &mut [[f64; 3]],
 ) {
     let share = wi.len().div_ceil(threads.max(1)).next_multiple_of(BATCH).max(BATCH);
+    if wi.len() <= share {
+        return eval_part(wi, wo, material, path, out); // a thread takes longer to start than a few pairs
+    }
     std::thread::scope(|scope| {
         for ((wi, wo), out) in wi.chunks(share).zip(wo.chunks(share)).zip(out.chunks_mut(share)) {
-            scope.spawn(move || eval_part(wi, wo, lattice, cells, path, out));
+            scope.spawn(move || eval_part(wi, wo, material, path, out));
         }
     });
 }
 
-fn eval_part(wi: &[[f64; 3]], wo: &[[f64; 3]], lattice: Lattice, cells: Cells, path: Path, out: &mut [[f64; 3]]) {
-    let mut at = [[0.0; BATCH]; 3];
+fn eval_part(wi: &[[f64; 3]], wo: &[[f64; 3]], material: &impl Material, path: Path, out: &mut [[f64; 3]]) {
+    // SAFETY: a path is only ever one that this processor has.
+    unsafe {
+        match path {
+            Path::Portable => batches(wi, wo, material, out),
+            #[cfg(target_arch = "x86_64")]
+            Path::Avx2 => batches_avx2(wi, wo, material, out),
+            #[cfg(target_arch = "x86_64")]
+            Path::Avx512 => batches_avx512(wi, wo, material, out),
+        }
+    }
+}
+
+#[inline(always)]
+fn batches(wi: &[[f64; 3]], wo: &[[f64; 3]], material: &impl Material, out: &mut [[f64; 3]]) {
+    let mut pairs = Pairs([[0.0; BATCH]; 6]);
+    let mut room = [[0.0; BATCH]; 4];
     for ((wi, wo), out) in wi.chunks(BATCH).zip(wo.chunks(BATCH)).zip(out.chunks_mut(BATCH)) {
-        // SAFETY: a path is only ever one that this processor has.
-        unsafe {
-            match path {
-                Path::Portable => positions(wi, wo, lattice, &mut at),
-                #[cfg(target_arch = "x86_64")]
-                Path::Avx2 => positions_avx2(wi, wo, lattice, &mut at),
-                #[cfg(target_arch = "x86_64")]
-                Path::Avx512 => positions_avx512(wi, wo, lattice, &mut at),
+        pairs.set(wi, wo);
+        material.batch(&pairs, &mut room, out);
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+unsafe fn batches_avx2(wi: &[[f64; 3]], wo: &[[f64; 3]], material: &impl Material, out: &mut [[f64; 3]]) {
+    batches(wi, wo, material, out)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx512vl")]
+unsafe fn batches_avx512(wi: &[[f64; 3]], wo: &[[f64; 3]], material: &impl Material, out: &mut [[f64; 3]]) {
+    batches(wi, wo, material, out)
+}
+
+/// The components of a batch of pairs, those of one kind one after the other. After the last pair of all there may be others.
+pub struct Pairs([Batch; 6]);
+
+impl Pairs {
+    #[inline(always)]
+    fn set(&mut self, wi: &[[f64; 3]], wo: &[[f64; 3]]) {
+        for (i, (a, b)) in wi.iter().zip(wo).enumerate() {
+            for j in 0..3 {
+                self.0[j][i] = a[j];
+                self.0[j + 3][i] = b[j];
             }
         }
-        match cells {
+    }
+
+    /// Whether both directions of a pair are above the horizon.
+    #[inline(always)]
+    pub fn above(&self, i: usize) -> bool {
+        (self.0[2][i] > 0.0) & (self.0[5][i] > 0.0)
+    }
+
+    /// cos θ_i and cos θ_o of a pair.
+    #[inline(always)]
+    pub fn cosines(&self, i: usize) -> [f64; 2] {
+        [self.0[2][i], self.0[5][i]]
+    }
+
+    /// θ_h, θ_d and φ_d of a pair, as `half_diff` gives them.
+    #[inline(always)]
+    pub fn half_diff(&self, i: usize, reciprocal: bool) -> [f64; 3] {
+        let pairs = &self.0;
+        let (sx, sy, sz) = (pairs[0][i] + pairs[3][i], pairs[1][i] + pairs[4][i], pairs[2][i] + pairs[5][i]);
+        let (vx, vy, vz) = (pairs[0][i] - pairs[3][i], pairs[1][i] - pairs[4][i], pairs[2][i] - pairs[5][i]);
+        let s = ((sx * sx + sy * sy) + sz * sz).sqrt();
+        let v = ((vx * vx + vy * vy) + vz * vz).sqrt();
+        let theta_h = atan2((sx * sx + sy * sy).sqrt(), sz);
+        let theta_d = atan2(v, s);
+        let x = 0.0 - vz * s;
+        let y = (vy * sx - vx * sy) + 0.0;
+        let other = (y < 0.0) | ((y == 0.0) & (x < 0.0));
+        let (up, across) = if other { (-y, -x + 0.0) } else { (y, x + 0.0) };
+        let folded = atan2(up, across);
+        let phi_d = if reciprocal | !other { folded } else { folded + std::f64::consts::PI };
+        [theta_h, theta_d, phi_d]
+    }
+}
+
+impl Material for OnLattice<'_> {
+    #[inline(always)]
+    fn batch(&self, pairs: &Pairs, room: &mut Room, out: &mut [[f64; 3]]) {
+        positions(pairs, self.lattice, room);
+        match self.cells {
             Cells::Values(values) => {
-                if !lattice.trilinear {
-                    at[0].iter().for_each(|&cell| prefetch(values, 3 * (cell as u32 as usize)));
+                if !self.lattice.trilinear {
+                    room[0].iter().for_each(|&cell| prefetch(values, 3 * (cell as u32 as usize)));
                 }
-                fill(wi, wo, lattice, &at, out, |cell| triple(values, cell));
+                fill(pairs, self.lattice, room, out, |cell| triple(values, cell));
             }
-            Cells::Index8(index, lut) => fill(wi, wo, lattice, &at, out, |cell| triple(lut, index[cell] as usize)),
-            Cells::Index16(index, lut) => fill(wi, wo, lattice, &at, out, |cell| triple(lut, index[cell] as usize)),
+            Cells::Index8(index, lut) => fill(pairs, self.lattice, room, out, |cell| triple(lut, index[cell] as usize)),
+            Cells::Index16(index, lut) => {
+                fill(pairs, self.lattice, room, out, |cell| triple(lut, index[cell] as usize))
+            }
         }
     }
 }
@@ -97,21 +188,14 @@ fn triple(table: &[f64], entry: usize) -> [f64; 3] {
 }
 
 #[inline(always)]
-fn fill(
-    wi: &[[f64; 3]],
-    wo: &[[f64; 3]],
-    lattice: Lattice,
-    at: &[Batch; 3],
-    out: &mut [[f64; 3]],
-    get: impl Fn(usize) -> [f64; 3],
-) {
-    for (i, value) in out.iter_mut().enumerate() {
+fn fill(pairs: &Pairs, lattice: Lattice, at: &Room, out: &mut [[f64; 3]], get: impl Fn(usize) -> [f64; 3]) {
+    for (i, value) in out.iter_mut().enumerate().take(BATCH) {
         let found = if lattice.trilinear {
             trilinear([at[0][i], at[1][i], at[2][i]], lattice.bins, &get)
         } else {
             get(at[0][i] as u32 as usize)
         };
-        *value = if (wi[i][2] > 0.0) & (wo[i][2] > 0.0) { found } else { [0.0; 3] };
+        *value = if pairs.above(i) { found } else { [0.0; 3] };
     }
 }
 
@@ -145,62 +229,31 @@ fn between(position: f64, bins: usize) -> (usize, usize, f64) {
     (lower as usize, lower as usize + (bins - 1).min(1), x - lower)
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-unsafe fn positions_avx2(wi: &[[f64; 3]], wo: &[[f64; 3]], lattice: Lattice, at: &mut [Batch; 3]) {
-    positions(wi, wo, lattice, at)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx512vl")]
-unsafe fn positions_avx512(wi: &[[f64; 3]], wo: &[[f64; 3]], lattice: Lattice, at: &mut [Batch; 3]) {
-    positions(wi, wo, lattice, at)
-}
-
 /// Continuous bin numbers of a batch of pairs, as `half_diff` and `Lattice._position` give them; for the nearest cell, its
 /// number in the place of the first.
 #[inline(always)]
-fn positions(wi: &[[f64; 3]], wo: &[[f64; 3]], lattice: Lattice, at: &mut [Batch; 3]) {
+fn positions(pairs: &Pairs, lattice: Lattice, at: &mut Room) {
     if lattice.trilinear {
-        positions_for::<true>(wi, wo, lattice, at)
+        positions_for::<true>(pairs, lattice, at)
     } else {
-        positions_for::<false>(wi, wo, lattice, at)
+        positions_for::<false>(pairs, lattice, at)
     }
 }
 
 #[inline(always)]
-fn positions_for<const TRILINEAR: bool>(wi: &[[f64; 3]], wo: &[[f64; 3]], lattice: Lattice, at: &mut [Batch; 3]) {
-    let mut pairs = [[0.0; BATCH]; 6];
-    for (i, (a, b)) in wi.iter().zip(wo).enumerate() {
-        for j in 0..3 {
-            pairs[j][i] = a[j];
-            pairs[j + 3][i] = b[j];
-        }
-    }
+fn positions_for<const TRILINEAR: bool>(pairs: &Pairs, lattice: Lattice, at: &mut Room) {
     let half_pi = std::f64::consts::FRAC_PI_2;
     let [bins_h, bins_d, bins_p] = lattice.bins.map(|n| n as f64);
     let range = if lattice.reciprocal { std::f64::consts::PI } else { std::f64::consts::TAU };
     for i in 0..BATCH {
-        let (sx, sy, sz) = (pairs[0][i] + pairs[3][i], pairs[1][i] + pairs[4][i], pairs[2][i] + pairs[5][i]);
-        let (vx, vy, vz) = (pairs[0][i] - pairs[3][i], pairs[1][i] - pairs[4][i], pairs[2][i] - pairs[5][i]);
-        let s = ((sx * sx + sy * sy) + sz * sz).sqrt();
-        let v = ((vx * vx + vy * vy) + vz * vz).sqrt();
-        let theta_h = atan2((sx * sx + sy * sy).sqrt(), sz);
-        let theta_d = atan2(v, s);
-        let x = 0.0 - vz * s;
-        let y = (vy * sx - vx * sy) + 0.0;
-        let other = (y < 0.0) | ((y == 0.0) & (x < 0.0));
-        let (up, across) = if other { (-y, -x + 0.0) } else { (y, x + 0.0) };
-        let folded = atan2(up, across);
-        let phi_d = if lattice.reciprocal | !other { folded } else { folded + std::f64::consts::PI };
+        let [theta_h, theta_d, phi_d] = pairs.half_diff(i, lattice.reciprocal);
         let u = bins_h * (theta_h * (1.0 / half_pi)).sqrt();
         let (v, w) = (theta_d * (bins_d / half_pi), phi_d * (bins_p / range));
         let bin = |position: f64, bins: f64| position.min(bins - 1.0).floor();
         let cell = bin(w, bins_p) + bins_p * (bin(v, bins_d) + bins_d * bin(u, bins_h));
-        at[0][i] = if TRILINEAR { u } else { cell };
-        if TRILINEAR {
-            at[1][i] = v;
-            at[2][i] = w;
+        let numbers = if TRILINEAR { &[u, v, w][..] } else { &[cell] };
+        for (at, &number) in at.iter_mut().zip(numbers) {
+            at[i] = number;
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod eval;
 mod nearest;
+mod node_lookup;
 mod query;
 mod simd;
 mod train;
@@ -174,7 +175,7 @@ fn lookup<'py>(
     if wi.len() != wo.len() || bins.contains(&0) || bins.iter().product::<usize>() != cells.len() {
         return Err(PyValueError::new_err("expected as many wi as wo, and a value for each cell"));
     }
-    let lattice = eval::Lattice { bins, reciprocal, trilinear };
+    let material = eval::OnLattice { lattice: eval::Lattice { bins, reciprocal, trilinear }, cells };
     let path = path_named(simd)?;
     let threads = threads_or_all(threads);
     // SAFETY: `eval` writes every element. NumPy gives large arrays large pages, which calloc's zeros do not get.
@@ -182,9 +183,72 @@ fn lookup<'py>(
     {
         let mut out = found.try_readwrite()?;
         let (rows, _) = out.as_slice_mut()?.as_chunks_mut::<3>();
-        py.detach(|| eval::eval(wi, wo, lattice, cells, path, threads, rows));
+        py.detach(|| eval::eval(wi, wo, &material, path, threads, rows));
     }
     Ok(found)
+}
+
+#[pyfunction]
+#[pyo3(signature = (wi, wo, theta_h, band, theta_d, phi_d, gains, shapes, gain, shape, scale, simd = None, threads = None))]
+#[allow(clippy::too_many_arguments)]
+fn lookup_nodes<'py>(
+    py: Python<'py>,
+    wi: PyReadonlyArray2<'py, f64>,
+    wo: PyReadonlyArray2<'py, f64>,
+    theta_h: Bound<'py, PyAny>,
+    band: Bound<'py, PyAny>,
+    theta_d: Bound<'py, PyAny>,
+    phi_d: Bound<'py, PyAny>,
+    gains: PyReadonlyArray1<'py, f64>,
+    shapes: PyReadonlyArray2<'py, f64>,
+    gain: PyReadonlyArray1<'py, u16>,
+    shape: PyReadonlyArray1<'py, u16>,
+    scale: f64,
+    simd: Option<&str>,
+    threads: Option<usize>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (wi, wo) = (rows(&wi, "wi")?, rows(&wo, "wo")?);
+    let nodes = node_lookup::Nodes::new(
+        &small_numbers::<Vec<u8>>(&theta_h, "theta_h")?,
+        &small_numbers::<Vec<u8>>(&band, "band")?,
+        &small_numbers::<Vec<Vec<u8>>>(&theta_d, "theta_d")?,
+        &small_numbers::<Vec<Vec<u8>>>(&phi_d, "phi_d")?,
+    )
+    .ok_or_else(|| {
+        PyValueError::new_err("nodes: expected axes that increase from 0 to 180, and a band for each row")
+    })?;
+    let factors = node_lookup::Factors {
+        gains: line(&gains, "gains")?,
+        shapes: rows(&shapes, "shapes")?,
+        gain: line(&gain, "gain")?,
+        shape: line(&shape, "shape")?,
+    };
+    if wi.len() != wo.len() || !factors.fit(nodes.size) {
+        return Err(PyValueError::new_err("expected as many wi as wo, and a finite gain and shape for each node"));
+    }
+    let path = path_named(simd)?;
+    let threads = threads_or_all(threads);
+    // SAFETY: `eval` writes every element.
+    let found = unsafe { PyArray2::new(py, [wi.len(), 3], false) };
+    {
+        let mut out = found.try_readwrite()?;
+        let (rows, _) = out.as_slice_mut()?.as_chunks_mut::<3>();
+        py.detach(|| {
+            let material = node_lookup::OnNodes::new(&nodes, factors, scale, wi.len());
+            eval::eval(wi, wo, &material, path, threads, rows)
+        });
+    }
+    Ok(found)
+}
+
+/// Whole numbers of a byte each, or lists of such.
+fn small_numbers<'py, T: FromPyObjectOwned<'py>>(numbers: &Bound<'py, PyAny>, name: &str) -> PyResult<T> {
+    numbers.extract().map_err(|_| PyValueError::new_err(format!("{name}: expected whole numbers from 0 to 180")))
+}
+
+/// Numbers that lie one after the other.
+fn line<'a, T: numpy::Element>(array: &'a PyReadonlyArray1<T>, name: &str) -> PyResult<&'a [T]> {
+    array.as_slice().map_err(|_| PyValueError::new_err(format!("{name}: expected numbers in one piece")))
 }
 
 fn threads_or_all(threads: Option<usize>) -> usize {
@@ -203,5 +267,6 @@ fn _core(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_class::<Learner>()?;
     module.add_class::<Palette>()?;
     module.add_function(wrap_pyfunction!(lookup, module)?)?;
+    module.add_function(wrap_pyfunction!(lookup_nodes, module)?)?;
     module.add_function(wrap_pyfunction!(simd_paths, module)?)
 }
