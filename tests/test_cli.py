@@ -24,7 +24,7 @@ INFO_KEYS = {
 COMPRESS_KEYS = INFO_KEYS | {
     "epochs", "seconds", "quantisation_error", "units_dropped", "cells_clamped", "output",
 }  # fmt: skip
-IMAGE_KEYS = {"psnr_object_db", "psnr_frame_db", "ssim", "delta_e_itp", "flip"}
+IMAGE_KEYS = {"psnr_object_db", "psnr_frame_db", "psnr_unrounded_db", "ssim", "delta_e_itp", "flip"}
 COMPARE_KEYS = IMAGE_KEYS | {"table_rmse", "table_log_error_cosine", "table_relative_error"}
 
 
@@ -137,6 +137,7 @@ def test_compare(capsys, folder, tmp_path):
     status, out, _ = run(capsys, "compare", folder / "pearl.binary", folder / "pearl.smrl", *SMALL_PICTURE)
     assert status == 0
     assert "PSNR, object" in out
+    assert "PSNR, object, not rounded" in out
 
 
 def test_compare_says_how_tables_are_looked_up(capsys, folder):

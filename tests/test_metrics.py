@@ -31,6 +31,22 @@ def test_psnr_over_object_and_frame_differ_by_the_share_of_the_object():
     assert found.psnr_frame_db - found.psnr_object_db == pytest.approx(-10 * np.log10(MASK.mean()))
 
 
+def check_unrounded(found, expected):
+    assert found == pytest.approx(expected, abs=0.05)
+
+
+def test_the_unrounded_psnr_sees_what_rounding_hides():
+    """A grey of 0.6, and one that is brighter by 0.1 %: the curve's slope times the difference."""
+    a = image(0.3)
+    found = metrics.image_metrics(a, a * np.float32(1.001), MASK)
+    step = 1.055 / 2.4 * 0.6 ** (1 / 2.4) * 0.001
+    check_unrounded(found.psnr_unrounded_db, -20 * np.log10(step))
+    must_fail(check_unrounded, found.psnr_object_db, -20 * np.log10(step))
+    far = image(0.3, 0.2)
+    rounded = metrics.image_metrics(far, far * np.float32(1.2), MASK)
+    assert rounded.psnr_unrounded_db == pytest.approx(rounded.psnr_object_db, abs=0.1)
+
+
 def test_exposure_comes_from_the_reference_object():
     a = image(7.0)
     a[~MASK] = 1e6
@@ -59,13 +75,14 @@ def test_srgb_encoding():
 def test_identical_images():
     a = image(0.3, 0.3)
     found = metrics.image_metrics(a, a, MASK)
-    assert (found.psnr_object_db, found.psnr_frame_db) == (np.inf, np.inf)
+    assert (found.psnr_object_db, found.psnr_frame_db, found.psnr_unrounded_db) == (np.inf, np.inf, np.inf)
     assert found.ssim == pytest.approx(1)
     assert (found.delta_e_itp, found.flip) == (0, 0)
 
 
 def check_worse(near, far):
     assert far.psnr_object_db < near.psnr_object_db
+    assert far.psnr_unrounded_db < near.psnr_unrounded_db
     assert far.ssim < near.ssim
     assert far.delta_e_itp > near.delta_e_itp
     assert far.flip > near.flip
@@ -83,7 +100,7 @@ def test_metrics_over_the_object_do_not_see_the_background():
     b = a.copy()
     b[:2] = b[-2:] = 5  # further away than any window about an object's pixel is wide
     found = metrics.image_metrics(a, b, MASK)
-    assert found.psnr_object_db == np.inf
+    assert (found.psnr_object_db, found.psnr_unrounded_db) == (np.inf, np.inf)
     assert found.psnr_frame_db < 30
     assert found.ssim == pytest.approx(1)
     assert found.delta_e_itp == 0

@@ -120,6 +120,7 @@ def image_rows(metrics: ImageMetrics) -> dict[str, str]:
     return {
         "PSNR, object": console.decibels(metrics.psnr_object_db),
         "PSNR, frame": console.decibels(metrics.psnr_frame_db),
+        "PSNR, object, not rounded to 8 bits": console.decibels(metrics.psnr_unrounded_db),
         "SSIM": f"{metrics.ssim:.4f}",
         "ΔE_ITP": f"{metrics.delta_e_itp:.2f}",
         "FLIP": f"{metrics.flip:.4f}",

@@ -1,6 +1,7 @@
 """How far a candidate is from a reference: on tables, and on rendered images.
 
-Image metrics judge what a viewer sees: 8-bit sRGB pixels at an exposure taken from the reference.
+Image metrics judge what a viewer sees: 8-bit sRGB pixels at an exposure taken from the reference. One of them is without
+the rounding to 8 bits, which hides small differences and costs large PSNRs.
 """
 
 from __future__ import annotations
@@ -61,12 +62,14 @@ class ImageMetrics:
     """Distances between two images at the reference's exposure. PSNRs are inf for identical images.
 
     psnr_object_db, psnr_frame_db: over the object's pixels, and over all; 8-bit sRGB, three channels together.
+    psnr_unrounded_db: over the object's pixels, on the sRGB curve but not rounded to 8 bits.
     ssim: structural similarity (Wang et al. 2004), delta_e_itp: ΔE_ITP (ITU-R BT.2124) on a display of 100 cd/m²,
     flip: ꟻLIP (Andersson et al. 2020): means over the object's pixels.
     """
 
     psnr_object_db: float
     psnr_frame_db: float
+    psnr_unrounded_db: float
     ssim: float
     delta_e_itp: float
     flip: float
@@ -79,7 +82,15 @@ def image_metrics(reference: Pixels, candidate: Pixels, mask: Mask) -> ImageMetr
     """
     scale = exposure(reference, mask)
     a, b = to_srgb8(reference * scale), to_srgb8(candidate * scale)
-    return ImageMetrics(psnr(a[mask], b[mask]), psnr(a, b), ssim(a, b, mask), delta_e_itp(a, b, mask), flip(a, b, mask))
+    unrounded = (to_srgb(image[mask] * scale) for image in (reference, candidate))
+    return ImageMetrics(
+        psnr_object_db=psnr(a[mask], b[mask]),
+        psnr_frame_db=psnr(a, b),
+        psnr_unrounded_db=psnr(*unrounded, peak=1.0),
+        ssim=ssim(a, b, mask),
+        delta_e_itp=delta_e_itp(a, b, mask),
+        flip=flip(a, b, mask),
+    )
 
 
 def exposure(reference: Pixels, mask: Mask) -> float:
@@ -90,17 +101,21 @@ def exposure(reference: Pixels, mask: Mask) -> float:
     return EXPOSED_TO / level
 
 
-def to_srgb8(linear: Pixels) -> NDArray[np.uint8]:
-    """Linear RGB, clipped to [0, 1], as 8-bit sRGB (IEC 61966-2-1)."""
+def to_srgb(linear: Pixels) -> Pixels:
+    """Linear RGB, clipped to [0, 1], on the curve of sRGB (IEC 61966-2-1), in [0, 1]."""
     x = np.clip(linear, 0, 1)
-    encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
-    return np.round(255 * encoded).astype(np.uint8)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
 
 
-def psnr(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float:
-    """Peak signal-to-noise ratio of 8-bit values [dB]."""
+def to_srgb8(linear: Pixels) -> NDArray[np.uint8]:
+    """Linear RGB, clipped to [0, 1], as 8-bit sRGB."""
+    return np.round(255 * to_srgb(linear)).astype(np.uint8)
+
+
+def psnr(a: NDArray[Any], b: NDArray[Any], peak: float = 255.0) -> float:
+    """Peak signal-to-noise ratio [dB] of values in [0, peak]; 8-bit ones by default."""
     mse = float(np.mean((a.astype(np.float64) - b) ** 2))
-    return 10 * np.log10(255**2 / mse).item() if mse > 0 else float("inf")
+    return 10 * np.log10(peak**2 / mse).item() if mse > 0 else float("inf")
 
 
 def ssim(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: Mask) -> float:
