@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import faiss
+import kmeans
 import numpy as np
 from minisom import MiniSom
 from timing import interleaved, ratio, text
@@ -43,11 +44,6 @@ def learn(start: Any, options: TrainOptions, search: str) -> None:
     train._learn(learner, len(x), options, None)
 
 
-def kmeans(x: Any, clusters: int) -> None:
-    trainer = faiss.Kmeans(3, clusters, niter=20, max_points_per_centroid=len(x), seed=0)
-    trainer.train(x)
-
-
 def minisom_sample(x: Any, clusters: int) -> float:
     """Seconds for one sample."""
     som = MiniSom(1, clusters, 3, sigma=0.1, learning_rate=0.02, random_seed=0)
@@ -68,7 +64,7 @@ def measure(path: Path, options: argparse.Namespace) -> list[dict[str, Any]]:
         start = x[sequence], sequence, weights
         contestants = {search: lambda s=start, c=chosen, n=search: learn(s, c, n) for search in ("boxes", "all")}
         contestants["scalar"] = lambda s=start, c=one: learn(s, c, "scalar")
-        contestants["faiss"] = lambda: kmeans(x, options.clusters)
+        contestants["faiss"] = lambda: kmeans.trained(x, options.clusters)
         seconds = interleaved(contestants, options.rounds)
         seconds["scalar"] = [options.epochs * value for value in seconds["scalar"]]
         ours = statistics.median(seconds["boxes"]) / (options.epochs * len(x))
