@@ -1,7 +1,7 @@
 """How far a candidate is from a reference: on tables, and on rendered images.
 
-Image metrics judge what a viewer sees: 8-bit sRGB pixels at an exposure taken from the reference. One of them is without
-the rounding to 8 bits, which hides small differences and costs large PSNRs.
+Image metrics judge what a viewer sees: 8-bit sRGB pixels at an exposure taken from the reference. One PSNR is without
+the rounding to 8 bits, which hides some small differences and enlarges others.
 """
 
 from __future__ import annotations
