@@ -25,8 +25,8 @@ def trained(x: Any, clusters: int) -> Any:
 def compressed(table: BrdfTable, clusters: int) -> tuple[SomManBrdf, int]:
     """The material whose palette is the means, looked up by the nearest cell, and its bytes.
 
-    The bytes are those of an .xz stream of the palette in float32 and the indices above the horizon, with the filters of
-    .smrl files. The palette is sorted by brightness, which makes the indices smoother, as ours is.
+    The bytes are those of an .xz stream of the palette in float32 and the indices above the horizon, with the filters
+    of .smrl files. The palette is sorted by brightness, as ours is, which makes the indices smoother.
     """
     above = table.lattice.above_horizon
     rgb = table.values[above]
