@@ -1,5 +1,7 @@
 """Small tables that many tests share, and what runs checks that must be able to fail."""
 
+import os
+import shutil
 from collections.abc import Callable
 from typing import Any
 
@@ -7,8 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sommerl import BrdfTable, Lattice
+from sommerl import BrdfTable, Lattice, SomManBrdf
 from sommerl.errors import SommerlError
+from sommerl.nodes import NodeLattice
+from sommerl.som_man.codes import gain_values, shape_values
 
 SMALL = Lattice(8, 8, 12)
 
@@ -33,6 +37,14 @@ def check_sentence(message: str | None, name: str) -> None:
     assert message is None or ("\n" not in message and f"{name}" in message)
 
 
+def tool(name: str) -> str:
+    """A program of the system's. Where the tests are the gate (.ci/run), it has to be there."""
+    found = shutil.which(name)
+    if not found and not os.environ.get("SOMMERL_ALL_TOOLS"):
+        pytest.skip(f"needs {name}")
+    return found or name
+
+
 def random_directions(count: int, seed: int = 0) -> NDArray[np.float64]:
     """Unit vectors above the horizon, uniform over the hemisphere."""
     v = np.random.default_rng(seed).standard_normal((count, 3))
@@ -44,3 +56,20 @@ def random_directions(count: int, seed: int = 0) -> NDArray[np.float64]:
 def lambertian_table(albedo: float = 0.5, lattice: Lattice = SMALL) -> BrdfTable:
     values = np.full((*lattice.shape, 3), albedo / np.pi)
     return BrdfTable(values, lattice, name="lambertian")
+
+
+def compact_material(lattice: NodeLattice, gains: int = 20, shapes: int = 15, *, name: str = "compact") -> SomManBrdf:
+    """A material on nodes with random palettes and entries; some shapes are negative in a channel."""
+    rng = np.random.default_rng(lattice.size)
+    gain_codes = np.sort(rng.choice(max(200, gains), gains, replace=False))
+    shape_codes = np.sort(rng.integers(-120, 121, (shapes, 2)), axis=0)
+    gain_index, index = (rng.integers(0, count, lattice.size).astype(np.uint16) for count in (gains, shapes))
+    return SomManBrdf(
+        shape_values(shape_codes),
+        index,
+        lattice,
+        gains=gain_values(gain_codes),
+        gain_index=gain_index,
+        scale=0.04,
+        name=name,
+    )

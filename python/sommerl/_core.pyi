@@ -61,6 +61,84 @@ class Palette:
     def query(self, triples: NDArray[np.float32]) -> NDArray[np.uint32]:
         """The nearest entry, the lowest one of several, for each of triples (n, 3)."""
 
+class NodePalette:
+    """The lattice and the palette of a compact material: its stream of bits, and which entries its nodes get.
+
+    docs/format.md says what the bits mean; `som_man/reference_codec.py` reads them in plain Python.
+    """
+
+    def __init__(
+        self,
+        theta_h: list[int],
+        band: list[int],
+        theta_d: list[list[int]],
+        phi_d: list[list[int]],
+        gains: list[int],
+        shapes: list[list[int]],
+    ) -> None:
+        """theta_h, band, theta_d, phi_d: the fields of the `NodeLattice`; bands in order, at most 16, and 2¹⁷ nodes.
+        gains (G,) and shapes (S, 2): codes (`som_man.codes`) in order, at most 1024 each. Raises ValueError for others.
+        """
+
+    @staticmethod
+    def decode(
+        data: bytes, simd: str | None = None
+    ) -> tuple[NodePalette, tuple[NDArray[np.uint16], NDArray[np.uint16]]]:
+        """What a stream holds: lattice and palette; and the gain and the shape of each node, (nodes,) each.
+
+        simd changes nothing but the time. Raises ValueError for a stream that `encode` does not write.
+        """
+
+    def encode(self, gain: NDArray[np.uint16], shape: NDArray[np.uint16], simd: str | None = None) -> bytes:
+        """The stream of a gain and a shape for each node, (nodes,) each. Raises ValueError for what does not fit."""
+
+    def measure(self, gain: NDArray[np.uint16], shape: NDArray[np.uint16]) -> tuple[float, float]:
+        """The bits that the stream would take: for lattice and palette, and for the indices."""
+
+    def sweep(
+        self,
+        gain: NDArray[np.uint16],
+        shape: NDArray[np.uint16],
+        gain_values: NDArray[np.float64],
+        shape_values: NDArray[np.float64],
+        starts: NDArray[np.int32],
+        columns: NDArray[np.int32],
+        values: NDArray[np.float64],
+        right: NDArray[np.float64],
+        price: float | None,
+    ) -> float:
+        """Gives each node in turn, in place, the gain and the shape that cost the least in error and bits; returns the
+        bits of the indices.
+
+        gain_values (G,), shape_values (S, 3): what the codes stand for. starts (nodes + 1,), columns, values: H, sparse
+        and by rows. right: b, (nodes, 3). Half the error of values z is zᵀHz/2 − bᵀz for each channel. price: of a bit,
+        as error; None changes nothing. Raises ValueError for what does not fit.
+        """
+
+    @property
+    def theta_h(self) -> list[int]:
+        """The rows' numbers on the fine grid."""
+
+    @property
+    def band(self) -> list[int]:
+        """Of each row."""
+
+    @property
+    def theta_d(self) -> list[list[int]]:
+        """For each band."""
+
+    @property
+    def phi_d(self) -> list[list[int]]:
+        """For each band."""
+
+    @property
+    def gains(self) -> list[int]:
+        """(G,), codes."""
+
+    @property
+    def shapes(self) -> list[list[int]]:
+        """(S, 2), codes."""
+
 def lookup(
     wi: NDArray[np.float64],
     wo: NDArray[np.float64],

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from .arrays import Triple, split
-from .lattice import Interpolation, Lattice, checked
+from .lattice import MERL, Interpolation, Lattice, checked
 
 Buffers = Mapping[str, Any]
 AT_ONCE = 2**16  # pairs that a formula is evaluated for: bounds memory, and stays in the cache
@@ -65,35 +65,47 @@ class Brdf(ABC):
 
 
 class OnLattice(Brdf):
-    """A BRDF whose values belong to the cells of a lattice. The core evaluates it, as `Brdf.eval` does in NumPy."""
+    """A BRDF that looks up values of a lattice. The core evaluates it, as `Brdf.eval` does in NumPy."""
 
-    lattice: Lattice
     interpolation: Interpolation
     source_sha256: str
 
     def eval(self, wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float64]:
         light, viewer = _broadcast(wi, wo)
+        pairs = (np.ascontiguousarray(w).reshape(-1, 3) for w in (light, viewer))
+        return self._found(*pairs).reshape(light.shape)
+
+    def _found(self, wi: NDArray[np.float64], wo: NDArray[np.float64]) -> NDArray[np.float64]:
+        """f_r of pairs of shape (n, 3)."""
         index, values = self.cells()
-        found = _core.lookup(
-            np.ascontiguousarray(light).reshape(-1, 3),
-            np.ascontiguousarray(viewer).reshape(-1, 3),
-            self.lattice.shape,
-            self.lattice.reciprocal,
+        lattice = self.grid or MERL
+        return _core.lookup(
+            wi,
+            wo,
+            lattice.shape,
+            lattice.reciprocal,
             self.interpolation == "trilinear",
             values.reshape(-1),
             None if index is None else index.reshape(-1),
         )
-        return found.reshape(light.shape)
+
+    @property
+    @abstractmethod
+    def grid(self) -> Lattice | None:
+        """The lattice of cells; None if values belong to nodes."""
 
     @abstractmethod
     def cells(self) -> tuple[NDArray[Any] | None, NDArray[np.float64]]:
         """The LUT entry of each cell, and the LUT; or None, and the cells' values."""
 
     def with_interpolation(self, interpolation: Interpolation) -> Self:
-        """The same cells, looked up in another way. Raises MaterialError if there is no such way."""
+        """The same values, looked up in another way. Raises MaterialError if there is no such way."""
         other = copy(self)
-        other.interpolation = checked(interpolation)
+        other._interpolate(interpolation)
         return other
+
+    def _interpolate(self, interpolation: Interpolation) -> None:
+        self.interpolation = checked(interpolation)
 
 
 def _broadcast(wi: ArrayLike, wo: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

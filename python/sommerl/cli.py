@@ -18,6 +18,7 @@ from .errors import OptionError, SommerlError
 from .lattice import INTERPOLATIONS
 from .materials import NAMES
 from .render.scenes import DEFAULT_SIZE, DEFAULT_SPP
+from .som_man.budget import DEFAULT_PSNR
 from .som_man.options import Order, Rule, Topology, TrainOptions
 
 TRAIN_DEFAULTS = TrainOptions()
@@ -126,7 +127,9 @@ def _demo(add: Any) -> None:
 
 def _compress(add: Any) -> None:
     summary = "Compresses materials by the paper's method (SOM-MAN) into .smrl files."
-    example = "sommerl compress nickel.binary -o nickel.smrl --clusters 1000\n  sommerl compress *.binary -o materials/"
+    example = """sommerl compress nickel.binary -o nickel.smrl --clusters 1000
+  sommerl compress measured.bsdf -o measured.smrl --preset compact --target-size 2700
+  sommerl compress *.bsdf -o materials/ --preset compact --target-psnr 50"""
     command = _command(add, "compress", commands.compress, summary, example)
     command.add_argument("inputs", nargs="+", metavar="IN", help="a material: path or built-in name")
     command.add_argument(
@@ -134,14 +137,22 @@ def _compress(add: Any) -> None:
     )
     command.add_argument(
         "--preset",
-        choices=["paper"],
-        default="paper",
-        help="full lattice, nearest lookup (%(default)s, the only one so far)",
+        choices=["paper", "compact"],
+        help="paper: MERL's lattice, nearest lookup; compact: a lattice fitted to the material, interpolated, in a "
+        "file of some kilobytes (paper; compact if there is a target)",
+    )
+    target = command.add_mutually_exclusive_group()
+    target.add_argument("--target-size", type=int, metavar="BYTES", help="compact: the best file of at most that size")
+    target.add_argument(
+        "--target-psnr",
+        type=float,
+        metavar="DB",
+        help=f"compact: the smallest file of at least that quality on a rendered sphere ({DEFAULT_PSNR:g})",
     )
     helps = {
-        "clusters": "M, the number of entries in the palette",
-        "epochs": "how often the table is presented",
-        "seed": "of first weights and order",
+        "clusters": "paper: M, the number of entries in the palette",
+        "epochs": "paper: how often the table is presented",
+        "seed": "of directions, first weights and order",
         "rule": "paper: Eq. 2 as printed; kohonen: without its factor x",
         "alpha": "first learning rate, above 0, at most 1",
         "order": "of presentation",

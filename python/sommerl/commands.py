@@ -10,19 +10,32 @@ from typing import Any
 
 from . import console
 from .brdf import Brdf, OnLattice
-from .describe import compression_rows, describe, fact_rows, image_rows, label, lookup, table_rows, text, trained
-from .errors import FormatError, OptionError
+from .describe import (
+    compact_rows,
+    compression_rows,
+    describe,
+    fact_rows,
+    image_rows,
+    label,
+    lookup,
+    table_rows,
+    text,
+    trained,
+)
+from .errors import FormatError, MissingDependencyError, OptionError
 from .files import check_writable
 from .formats.names import split_member
 from .load import EXTENSIONS, interpolated, load, load_table
 from .metrics import exposure, table_metrics, to_srgb8
-from .render.compare import compare_on_sphere
+from .render.compare import compare_on_sphere, judge_on_sphere
 from .render.environment import default_environment, load_environment
 from .render.images import side_by_side, write_image
 from .render.llvm import mitsuba
 from .render.scenes import LARGEST_SIZE, sphere
 from .render.scenes import render as render_scene
+from .som_man import budget
 from .som_man import file as smrl
+from .som_man.budget import CompactOptions
 from .som_man.material import SomManBrdf
 from .som_man.options import TrainOptions
 from .table import BrdfTable
@@ -32,16 +45,29 @@ MOST_SPP = 2**20
 
 
 def compress(options: Namespace) -> dict[str, Any]:
-    train_options = TrainOptions(**{field.name: getattr(options, field.name) for field in fields(TrainOptions)})
+    targets = options.target_size, options.target_psnr
+    compact = (options.preset or ("paper" if targets == (None, None) else "compact")) == "compact"
+    method = (
+        CompactOptions(options.target_size, options.target_psnr, options.seed) if compact else _train_options(options)
+    )
     outputs = _outputs(options.inputs, options.output)
     if len(options.inputs) > 1:
         for source in options.inputs:
             load(source)  # so that a bad one is found before hours are spent on the others
     results = [
-        compress_one(load_table(source), output, train_options, options.json)
+        compact_one(load(source), output, method, options.json)
+        if isinstance(method, CompactOptions)
+        else compress_one(load_table(source), output, method, options.json)
         for source, output in zip(options.inputs, outputs, strict=True)
     ]
     return results[0] if len(results) == 1 else {"materials": results}
+
+
+def _train_options(options: Namespace) -> TrainOptions:
+    for name in ("target_size", "target_psnr"):
+        if getattr(options, name) is not None:
+            raise OptionError(f"{name}: expected --preset compact, found paper")
+    return TrainOptions(**{field.name: getattr(options, field.name) for field in fields(TrainOptions)})
 
 
 def _outputs(inputs: list[str], output: Path) -> list[Path]:
@@ -71,6 +97,28 @@ def compress_one(table: BrdfTable, output: Path, options: TrainOptions, quiet: b
     if not quiet:
         console.print_rows(f"{material.name} → {output}", compression_rows(material, written, report))
     return result
+
+
+def compact_one(brdf: Brdf, output: Path, options: CompactOptions, quiet: bool) -> dict[str, Any]:
+    with console.progress(f"compressing {brdf.name}") as advance:
+        material, report = budget.compress(brdf, options, quality=_judge(brdf, options), progress=advance)
+    written = smrl.save(material, output)
+    result = describe(material, written) | {"options": asdict(options), "psnr_object_db": report.psnr_db}
+    result |= {"seconds": report.seconds, "cells_clamped": getattr(brdf, "cells_clamped", None), "output": str(output)}
+    result |= dict.fromkeys(("epochs", "quantisation_error", "units_dropped"))
+    if not quiet:
+        console.print_rows(f"{material.name} → {output}", compact_rows(material, written, report))
+    return result
+
+
+def _judge(brdf: Brdf, options: CompactOptions) -> budget.Quality | None:
+    """The renderer; without it, the fit's own error has to do where a size is asked for."""
+    try:
+        return judge_on_sphere(brdf, default_environment())
+    except MissingDependencyError:
+        if options.target_size is None:
+            raise
+        return None
 
 
 def info(options: Namespace) -> dict[str, Any]:
@@ -149,7 +197,7 @@ def _alike(reference: Brdf, candidate: Brdf, asked: Any) -> tuple[Brdf, Brdf]:
     def adapted(brdf: Brdf, other: Brdf) -> Brdf:
         if asked:
             return interpolated(brdf, asked)
-        if isinstance(brdf, BrdfTable) and isinstance(other, SomManBrdf) and other.lattice == brdf.lattice:
+        if isinstance(brdf, BrdfTable) and isinstance(other, SomManBrdf) and other.grid == brdf.lattice:
             return brdf.with_interpolation(other.interpolation)
         return brdf
 
@@ -158,7 +206,7 @@ def _alike(reference: Brdf, candidate: Brdf, asked: Any) -> tuple[Brdf, Brdf]:
 
 def _sampled(reference: Brdf, candidate: Brdf) -> tuple[BrdfTable, BrdfTable]:
     """Both at the cell centres of one lattice: the reference's, the candidate's or MERL's."""
-    lattices = [brdf.lattice for brdf in (reference, candidate) if isinstance(brdf, OnLattice)]
+    lattices = [brdf.grid for brdf in (reference, candidate) if isinstance(brdf, OnLattice) and brdf.grid]
     first, second = (BrdfTable.sample(brdf, *lattices[:1]) for brdf in (reference, candidate))
     return first, second
 

@@ -16,12 +16,13 @@ from .formats.scattered import ScatteredTable
 from .load import load
 from .materials import NAMES, builtin_table
 from .plots import coverage
+from .som_man import file as smrl
 from .som_man.material import SomManBrdf
 from .som_man.options import TrainOptions
 from .table import BrdfTable
 
 EXTENSIONS = {
-    ".smrl": "Sommerl, with the defaults of compress",
+    ".smrl": "Sommerl, compressed with the defaults of compress if need be",
     ".binary": "MERL",
     ".bsdf": "RGL, for the `measured` materials of Mitsuba and pbrt-v4",
     **dict.fromkeys(shader.LANGUAGES, "source code with an eval, compressed first if need be"),
@@ -39,7 +40,7 @@ def convert(options: Namespace) -> dict[str, Any]:
     output: Path = options.output
     extension = output.suffix.lower()
     report = {} if extension in SNIPPETS else _report(brdf, output)
-    if extension == ".smrl":
+    if extension == ".smrl" and not isinstance(brdf, SomManBrdf):
         result = compress_one(BrdfTable.of(brdf), output, TrainOptions(), options.json)
     else:
         written = _write(brdf, options, extension)
@@ -49,7 +50,7 @@ def convert(options: Namespace) -> dict[str, Any]:
             clamped = f", {result['cells_clamped']} cells clamped to 0" if result["cells_clamped"] else ""
             print(f"{written.name} → {output} ({console.size(size)}{clamped})")
     if not options.json:
-        _print_report(report if extension != ".smrl" else report | {"facts": {}})
+        _print_report(report | {"facts": {}} if "epochs" in result else report)
     return result | report
 
 
@@ -70,6 +71,9 @@ def _check(options: Namespace) -> None:
 def _write(brdf: Brdf, options: Namespace, extension: str) -> Brdf:
     """Writes a material; returns what it was turned into for that."""
     output: Path = options.output
+    if isinstance(brdf, SomManBrdf) and extension == ".smrl":
+        smrl.save(brdf, output)
+        return brdf
     if extension == ".binary":
         table = merl.resampled(brdf)
         merl.write(table, output)

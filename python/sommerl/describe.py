@@ -10,6 +10,8 @@ from . import console
 from .brdf import Brdf, OnLattice
 from .formats.rgl import RglBrdf
 from .metrics import ImageMetrics, table_metrics
+from .nodes import NodeLattice
+from .som_man.budget import CompactReport
 from .som_man.material import SomManBrdf
 from .som_man.options import TrainOptions
 from .som_man.train import TrainReport, train
@@ -32,18 +34,20 @@ def trained(table: BrdfTable, options: TrainOptions) -> tuple[SomManBrdf, TrainR
 
 def describe(brdf: Brdf, bytes_disk: int | None) -> dict[str, Any]:
     """What `info` says of a material; null where a kind of material has no such thing."""
-    known: dict[str, Any] = dict.fromkeys(("clusters", "lattice", "interpolation", "domain", "bytes_paper"))
+    known: dict[str, Any] = dict.fromkeys(("clusters", "lattice", "nodes", "interpolation", "domain", "bytes_paper"))
     known |= dict.fromkeys(("bytes_memory", "options", "metrics", "source_sha256", "cells_clamped"))
     kind = "measurement" if isinstance(brdf, RglBrdf) else "model"
     if isinstance(brdf, SomManBrdf):
         kind = "som-man"
-        known |= {"clusters": brdf.clusters, "domain": "linear", "bytes_paper": brdf.bytes_paper}
+        known |= {"clusters": brdf.clusters, "domain": brdf.domain, "bytes_paper": brdf.bytes_paper}
         known |= {"bytes_memory": brdf.bytes_memory, "options": brdf.options, "metrics": brdf.metrics}
     if isinstance(brdf, BrdfTable):
         kind = "table"
         known |= {"domain": "linear", "bytes_memory": brdf.values.nbytes, "cells_clamped": brdf.cells_clamped}
-    if isinstance(brdf, OnLattice):
+    if isinstance(brdf, (BrdfTable, SomManBrdf)):
         known |= {"lattice": list(brdf.lattice.shape), "interpolation": brdf.interpolation}
+        if isinstance(brdf.lattice, NodeLattice):
+            known["nodes"] = brdf.lattice.size
     known["source_sha256"] = getattr(brdf, "source_sha256", None)
     return {"kind": kind, "name": brdf.name, **known, "facts": brdf.facts or None, "bytes_disk": bytes_disk}
 
@@ -104,6 +108,18 @@ def compression_rows(material: SomManBrdf, bytes_disk: int, report: TrainReport)
     if report.cells_clamped:
         rows["cells clamped to 0"] = str(report.cells_clamped)
     return rows | fact_rows(material.facts) | {"training": f"{report.seconds:.1f} s"}
+
+
+def compact_rows(material: SomManBrdf, bytes_disk: int, report: CompactReport) -> dict[str, str]:
+    """The same of the preset compact."""
+    rows = {
+        "nodes": str(material.lattice.size),
+        "palette": f"{len(material.gains)} gains, {len(material.lut)} shapes",
+        "PSNR, object, on a sphere": console.decibels(report.psnr_db) if report.psnr_db is not None else "not measured",
+        "size in memory": console.size(material.bytes_memory),
+        "size on disk": console.size(bytes_disk),
+    }
+    return rows | {"time": f"{report.seconds:.1f} s"}
 
 
 def table_rows(metrics: Mapping[str, float]) -> dict[str, str]:

@@ -20,6 +20,7 @@ from .half_diff import TWO_PI, half_diff
 Interpolation = Literal["nearest", "trilinear"]
 INTERPOLATIONS: tuple[Interpolation, ...] = ("nearest", "trilinear")
 HALF_PI = TWO_PI / 4
+ON_HORIZON = 1e-12  # a cosine up to that is 0 but for rounding; files depend on which cells count
 
 
 @dataclass(frozen=True)
@@ -78,8 +79,9 @@ class Lattice:
         """Cells with both directions above the horizon at their centre, of the lattice's shape.
 
         They are those with cos θ_h cos θ_d > |sin θ_h sin θ_d cos φ_d|: for each (θ_h, φ_d), the first few in θ_d.
+        Those on the horizon are not among them, however a machine rounds.
         """
-        return np.minimum(*self.cosines()) > 0
+        return np.minimum(*self.cosines()) > ON_HORIZON
 
     def solid_angles(self) -> NDArray[np.float64]:
         """dω_i dω_o of every cell, up to a constant factor: sin θ_h sin θ_d cos θ_d dθ_h (Rusinkiewicz 1998)."""

@@ -7,6 +7,7 @@ steps of √(θ_h / 90°), 1/360 each up to 1/4 and 1/120 each from there, θ_d 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Array, Triple, ops
+from .arrays import Array, Triple, gather3, ops
 from .brdf import Brdf, Buffers
 from .errors import MaterialError
 from .half_diff import TWO_PI, half_diff
@@ -72,6 +73,24 @@ class NodeLattice:
             "phi_d_count": np.array([len(axis) for axis in self.phi_d], np.uint8),
         }
 
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """The number of rows, and the most nodes in θ_d and in φ_d that a row has."""
+        return len(self.theta_h), max(map(len, self.theta_d)), max(map(len, self.phi_d))
+
+    def axes(self) -> tuple[list[int], list[int], list[list[int]], list[list[int]]]:
+        """theta_h, band, theta_d, phi_d, as the core takes them."""
+        return list(self.theta_h), list(self.band), [*map(list, self.theta_d)], [*map(list, self.phi_d)]
+
+    def lookup(self, wi: Triple, wo: Triple, fetch: Callable[[Array], Triple], buffers: Buffers) -> Triple:
+        """What `fetch` gives for the nodes about a pair of directions, blended."""
+        (node, weight), *others = self.corners(*place(wi, wo), buffers)
+        x, y, z = (weight * value for value in fetch(node))
+        for node, weight in others:
+            more = fetch(node)
+            x, y, z = x + weight * more[0], y + weight * more[1], z + weight * more[2]
+        return x, y, z
+
     def corners(self, x: Array, y: Array, z: Array, buffers: Buffers) -> list[tuple[Array, Array]]:
         """The 8 nodes about a place on the fine grid (θ_h, θ_d, φ_d), and their weights, which add up to 1."""
         f = ops(x)
@@ -116,8 +135,20 @@ def damped(wi: Triple, wo: Triple) -> Array:
     return f.maximum(wi[2], SMALLEST_COSINE) * f.maximum(wo[2], SMALLEST_COSINE)
 
 
+def from_cube_root(y: Triple, wi: Triple, wo: Triple, scale: Array) -> Triple:
+    """f_r of values y in the cube-root domain: scale · max(0, y)³ / `damped`."""
+    f = ops(wi[0])
+    factor = scale / damped(wi, wo)
+
+    def channel(value: Array) -> Array:
+        above = f.maximum(value, 0.0)
+        return above * above * above * factor
+
+    return channel(y[0]), channel(y[1]), channel(y[2])
+
+
 class FittedTable(Brdf):
-    """A material as values on a lattice of its own: f_r = scale · max(0, y)³ / `damped`, y interpolated from nodes.
+    """A material as values on a lattice of its own, in the cube-root domain, not quantised.
 
     values: y of each node, (nodes.size, 3). Reciprocal by construction. Made by `som_man.fit`.
     """
@@ -128,18 +159,11 @@ class FittedTable(Brdf):
         self.nodes, self.values, self.scale, self.name = nodes, values, scale, name
 
     def buffers(self) -> dict[str, NDArray[Any]]:
-        return self.nodes.buffers() | {"values": self.values.reshape(-1)}
+        return self.nodes.buffers() | {"values": self.values.reshape(-1), "scale": np.array([self.scale])}
 
     def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
-        f = ops(wi[0])
-        corners = self.nodes.corners(*place(wi, wo), buffers)
-        factor = self.scale / damped(wi, wo)
-
-        def channel(c: int) -> Array:
-            y = f.maximum(sum(weight * f.gather(buffers["values"], 3 * node + c) for node, weight in corners), 0.0)
-            return y * y * y * factor
-
-        return channel(0), channel(1), channel(2)
+        y = self.nodes.lookup(wi, wo, lambda node: gather3(buffers["values"], node), buffers)
+        return from_cube_root(y, wi, wo, buffers["scale"])
 
 
 def _increases(axis: tuple[int, ...]) -> bool:

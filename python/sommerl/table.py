@@ -69,7 +69,7 @@ class BrdfTable(OnLattice):
         """The BRDF itself if it is a table; else the table of its cells, or at MERL's cell centres if it has none."""
         if isinstance(brdf, BrdfTable):
             return brdf
-        table = cls.sample(brdf, getattr(brdf, "lattice", MERL))
+        table = cls.sample(brdf, (brdf.grid if isinstance(brdf, OnLattice) else None) or MERL)
         table.source_facts = brdf.facts
         table.source_sha256 = getattr(brdf, "source_sha256", table.source_sha256)
         return table
@@ -77,6 +77,10 @@ class BrdfTable(OnLattice):
     @property
     def facts(self) -> dict[str, Any]:
         return dict(self.source_facts)
+
+    @property
+    def grid(self) -> Lattice:
+        return self.lattice
 
     def cells(self) -> tuple[None, NDArray[np.float64]]:
         return None, self.values

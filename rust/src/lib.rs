@@ -3,6 +3,7 @@
 mod eval;
 mod nearest;
 mod node_lookup;
+mod nodes;
 mod query;
 mod simd;
 mod train;
@@ -266,6 +267,7 @@ fn _core(module: &Bound<PyModule>) -> PyResult<()> {
     module.add("EMPTY", train::EMPTY)?;
     module.add_class::<Learner>()?;
     module.add_class::<Palette>()?;
+    module.add_class::<nodes::python::NodePalette>()?;
     module.add_function(wrap_pyfunction!(lookup, module)?)?;
     module.add_function(wrap_pyfunction!(lookup_nodes, module)?)?;
     module.add_function(wrap_pyfunction!(simd_paths, module)?)

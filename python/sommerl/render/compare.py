@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..brdf import Brdf
-from ..metrics import ImageMetrics, exposure, image_metrics, to_srgb8
+from ..metrics import ImageMetrics, exposure, image_metrics, psnr, to_srgb8
 from ..sampling import BlinnPhongSampler
 from .images import difference
 from .scenes import DEFAULT_SIZE, DEFAULT_SPP, Image, Progress, render, sphere
@@ -57,3 +57,20 @@ def compare_on_sphere(
         images.append(render(scene, spp=spp, seed=seed, progress=advance))
     first, *others = images
     return [Comparison(first, image, image_metrics(first.pixels, image.pixels, first.mask)) for image in others]
+
+
+def judge_on_sphere(reference: Brdf, environment: NDArray[np.float32]) -> Callable[[Brdf], float]:
+    """A function that gives a candidate's PSNR over the object [dB], as `compare_on_sphere` does with its defaults.
+
+    The reference is rendered once.
+    """
+    sampler = BlinnPhongSampler.fitted(reference)
+    first = render(sphere(reference, environment, sampler=sampler))
+    scale = exposure(first.pixels, first.mask)
+    target = to_srgb8(first.pixels[first.mask] * scale)
+
+    def quality(candidate: Brdf) -> float:
+        image = render(sphere(candidate, environment, sampler=sampler))
+        return psnr(target, to_srgb8(image.pixels[first.mask] * scale))
+
+    return quality

@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Triple
-from ..brdf import Brdf
+from ..brdf import Brdf, OnLattice
 from ..errors import MaterialError
 from ..half_diff import directions
 from ..nodes import ABOVE, BELOW, FINE, KNEE, SMALLEST_COSINE, FittedTable, NodeLattice, angles_at, damped
 from ..optional import optional
+from .quantise import Problem
 
 Array = NDArray[np.float64]
 Choices = dict[int, tuple[list[int], float]]  #: for each number of nodes: their places, and the error left
@@ -46,6 +47,8 @@ class Fitter:
 
     def __init__(self, brdf: Brdf, *, seed: int = 0) -> None:
         self._brdf = brdf
+        grid = brdf.grid if isinstance(brdf, OnLattice) else None
+        self._one_way = grid is not None and not grid.reciprocal
         self._sparse, self._solvers = (
             optional(module, "SciPy", "fitting", "formats") for module in ("scipy.sparse", "scipy.sparse.linalg")
         )
@@ -53,7 +56,7 @@ class Fitter:
         axes = np.arange(FINE + 1.0), np.arange(0.0, FINE + 1, 3.0), np.arange(0.0, FINE, 4.0)
         wi, wo, f_damped = self._source(*axes)
         seen = np.minimum(wi[2], wo[2]) > SMALLEST_COSINE
-        self.scale = float(np.median(f_damped[seen]))
+        self.scale = float(np.float32(np.median(f_damped[seen])))  # as a file holds it
         if not self.scale > 0:
             raise MaterialError(f"{brdf.name}: expected a positive reflectance for most directions, found less")
         grid = self._scaled(*axes, wi, wo, f_damped)
@@ -71,10 +74,14 @@ class Fitter:
 
     def fit(self, nodes: int) -> FittedTable:
         """The material on so many nodes or a few less. Raises MaterialError for a number out of range."""
+        problem = self.problem(nodes)
+        return FittedTable(problem.lattice, problem.best, self.scale, name=self._brdf.name)
+
+    def problem(self, nodes: int) -> Problem:
+        """The least squares of the material on so many nodes or a few less, solved."""
         if not SMALLEST <= nodes <= LARGEST:
             raise MaterialError(f"nodes: expected {SMALLEST} to {LARGEST}, found {nodes}")
-        lattice = self._lattice(nodes)
-        return FittedTable(lattice, self._values(lattice), self.scale, name=self._brdf.name)
+        return self._solved(self._lattice(nodes))
 
     def _band(self, low: int, high: int) -> tuple[Choices, Choices]:
         """Nodes in θ_d and in φ_d for the rows from `low` to `high`; errors as those of all rows of the fine grid."""
@@ -92,8 +99,13 @@ class Fitter:
         wi, wo = directions(*angles_at(*np.meshgrid(x, y, z, indexing="ij")))
         f_r = np.zeros((*wi[0].shape, 3))
         seen = np.minimum(wi[2], wo[2]) > SMALLEST_COSINE
-        f_r[seen] = self._brdf.eval(*(np.stack([c[seen] for c in w], axis=-1) for w in (wi, wo)))
+        f_r[seen] = self._eval(*(np.stack([c[seen] for c in w], axis=-1) for w in (wi, wo)))
         return wi, wo, f_r * damped(wi, wo)[..., None]
+
+    def _eval(self, wi: Array, wo: Array) -> Array:
+        """The source; the mean of both orders, where it is not reciprocal, for the fit is."""
+        f_r = self._brdf.eval(wi, wo)
+        return 0.5 * (f_r + self._brdf.eval(wo, wi)) if self._one_way else f_r
 
     def _grid(self, x: Array, y: Array, z: Array) -> _Grid:
         return self._scaled(x, y, z, *self._source(x, y, z))
@@ -113,7 +125,7 @@ class Fitter:
         above = np.minimum(wi[2], wo[2]) > 1e-4
         self._places = x[above], y[above], z[above]
         wi, wo = ((w[0][above], w[1][above], w[2][above]) for w in (wi, wo))
-        f_r = self._brdf.eval(np.stack(wi, axis=-1), np.stack(wo, axis=-1))
+        f_r = self._eval(np.stack(wi, axis=-1), np.stack(wo, axis=-1))
         self._targets = np.cbrt(f_r * (damped(wi, wo) / self.scale)[:, None])
         weight = _measure(*self._places, wi, wo) ** MEASURE_POWER
         self._weights = weight / weight.mean()
@@ -153,7 +165,7 @@ class Fitter:
             tuple(tuple(self._phi_d[b][counts[b][1]][0]) for b in used),
         )
 
-    def _values(self, lattice: NodeLattice) -> Array:
+    def _solved(self, lattice: NodeLattice) -> Problem:
         """Least squares of the interpolation at the samples, by conjugate gradients."""
         corners = lattice.corners(*self._places, lattice.buffers())
         nodes, weights = (np.stack([corner[k] for corner in corners], axis=-1) for k in (0, 1))
@@ -179,7 +191,9 @@ class Fitter:
             self._solvers.cg(system, right[:, c], x0=sampled[:, c], M=scaled, maxiter=200, rtol=1e-5)[0]
             for c in range(3)
         ]
-        return np.stack(columns, axis=-1)
+        best = np.stack(columns, axis=-1)
+        error = float((((matrix @ best - self._targets) ** 2) * self._weights[:, None]).sum())
+        return Problem(lattice, system.tocsr(), np.ascontiguousarray(right), best, error)
 
 
 def line_errors(y: Array, weight: Array, axis: int, random: np.random.Generator) -> Array:

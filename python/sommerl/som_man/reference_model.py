@@ -1,0 +1,251 @@
+"""How likely each entry of a palette is for the next node, in plain Python: docs/format.md, *The entries*.
+
+Nothing but +, −, ×, ÷, √ and ⌊⌋ of IEEE 754 doubles, in the order written there, whose letters these are.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left, bisect_right
+
+FINE = 180
+OCTAVE, UNIT = 128, 64  # codes to 1 in the coordinates of gains and shapes
+NEIGHBOURS = range(10)
+FORGET = 1.0005
+WHOLE = 65536.0
+REACH = 16.0
+
+Floats = list[float]
+Grid = list[Floats]  # [c][node of a row]
+Plane = tuple[Grid, Grid]  # values and errors
+Way = tuple[int, int, float]
+
+
+class Model:
+    """Expects nodes one after the other, in the order of the stream."""
+
+    def __init__(
+        self,
+        lattice: tuple[list[int], list[int], list[list[int]], list[list[int]]],
+        gains: list[int],
+        shapes: list[tuple[int, int]],
+    ) -> None:
+        _, self._band, self._theta_d, self._phi_d = lattice
+        places = [[code / OCTAVE for code in gains], *([shape[axis] / UNIT for shape in shapes] for axis in (0, 1))]
+        self._places = places
+        self._predictors = [Predictor(values) for values in places]
+        self._gains, self._shapes = Entries(places[0], [0.0] * len(gains)), Entries(places[1], places[2])
+        self._present = self._above = self._higher = _plane(0)
+
+    def begin(self, row: int) -> None:
+        """Before the first node of a row."""
+        self._row, band = row, self._band[row]
+        if row > 0:
+            self._higher, self._above = self._above, self._present
+            before = self._band[row - 1]
+            if before != band:
+                self._above = self._moved(self._above, before, band)
+                self._higher = self._moved(self._higher, before, band) if row > 1 else self._higher
+        self._width, self._height = len(self._phi_d[band]), len(self._theta_d[band])
+        self._present = _plane(self._width * self._height)
+
+    def _moved(self, plane: Plane, old: int, new: int) -> Plane:
+        width, moved = len(self._phi_d[old]), _plane(0)
+        for y in self._theta_d[new]:
+            d0, d1, v = _between(self._theta_d[old], y)
+            for x in self._phi_d[new]:
+                p0, p1, u = _around(self._phi_d[old], x)
+                for grid, to in zip(plane, moved, strict=True):
+                    for a, out in zip(grid, to, strict=True):
+                        low = a[d0 * width + p0] * (1.0 - u) + a[d0 * width + p1] * u
+                        high = a[d1 * width + p0] * (1.0 - u) + a[d1 * width + p1] * u
+                        out.append(low * (1.0 - v) + high * v)
+        return moved
+
+    def expect(self, d: int, p: int) -> None:
+        """Before a node: what its coordinates are likely to be."""
+        phi_d, at, under = self._phi_d[self._band[self._row]], d * self._width + p, self._row > 0
+        mirror = _between(phi_d[:p], FINE - phi_d[p]) if p and FINE - phi_d[p] <= phi_d[p - 1] else None
+        for c, predictor in enumerate(self._predictors):
+            up, values = self._neighbours(c, d, p, mirror)
+            present, above = self._present[1][c], self._above[1][c]
+            errors = [
+                *([present[at - 1]] if p > 0 else []),
+                *([present[at - self._width]] if d > 0 else []),
+                *([above[at]] if under else []),
+            ]
+            predictor.predict(up, values, errors)
+
+    def _neighbours(self, c: int, d: int, p: int, mirror: Way | None) -> tuple[float, Floats]:
+        """The value that all others are compared with, and these."""
+        width, under = self._width, self._row > 0
+        now, above, higher = (plane[0][c] for plane in (self._present, self._above, self._higher))
+        line, at = d * width, d * width + p
+        west, east = line + (p - 1) % width, line + (p + 1) % width
+        if under:
+            up = above[at]
+        elif p > 0 and d > 0:
+            up = 0.5 * (now[at - 1] + now[at - width])
+        else:
+            up = now[at - 1] if p > 0 else now[at - width] if d > 0 else 0.0
+        news = 0.0
+        if mirror:
+            q0, q1, u = mirror
+            before = above[line + q0] * (1.0 - u) + above[line + q1] * u if under else up
+            news = now[line + q0] * (1.0 - u) + now[line + q1] * u - before
+        return up, [
+            now[at - 1] if p > 0 else above[west] if under else up,
+            now[at - width] if d > 0 else up,
+            now[west - width] if d > 0 else up,
+            now[east - width] if d > 0 else up,
+            above[west] if under else up,
+            above[at - width] if under and d > 0 else up,
+            above[east] if under else up,
+            above[at + width] if under and d + 1 < self._height else up,
+            higher[at] if self._row > 1 else up,
+            up + news,
+        ]
+
+    def gain_weights(self) -> list[int]:
+        """The weights of all gains for the node that is expected."""
+        return self._gains.weigh(*self._predictors[0].expected(), 0.0, 0.0)
+
+    def shape_weights(self) -> list[int]:
+        """The weights of all shapes."""
+        return self._shapes.weigh(*self._predictors[1].expected(), *self._predictors[2].expected())
+
+    def learn(self, d: int, p: int, gain: int, shape: int) -> None:
+        """What follows for the nodes to come."""
+        self._gains.learn(gain)
+        self._shapes.learn(shape)
+        at, (values, errors) = d * self._width + p, self._present
+        for c, entry in enumerate((gain, shape, shape)):
+            values[c][at] = self._places[c][entry]
+            errors[c][at] = self._predictors[c].learn(values[c][at])
+
+
+class Predictor:
+    """Of one coordinate, from its neighbours: recursive least squares."""
+
+    def __init__(self, values: Floats) -> None:
+        mean = _sum(values) / len(values)
+        variance = _sum([(value - mean) * (value - mean) for value in values]) / len(values) + 1e-4
+        self._w = [0.5, 0.5, 0.0, 0.0, -0.5, -0.5, 0.0, 0.0, 0.0, 0.0]
+        self._matrix = [[25.0 / variance if i == j else 0.0 for j in NEIGHBOURS] for i in NEIGHBOURS]
+        self._level = 0.15 * math.sqrt(variance)
+
+    def predict(self, up: float, values: Floats, errors: Floats) -> None:
+        """errors: of the nodes next to it, as far as there are any."""
+        self._x = [value - up for value in values]
+        self._predicted = up
+        for w, x in zip(self._w, self._x, strict=True):
+            self._predicted += w * x
+        total, count = 0.7 * self._level, 0.7
+        for error in errors:
+            total, count = total + error, count + 1.0
+        self._scale = total / count + 0.02 * self._level + 1e-4
+
+    def expected(self) -> tuple[float, float]:
+        """What is predicted, and 1 / the error that is expected."""
+        return self._predicted, 1.0 / self._scale
+
+    def learn(self, value: float) -> float:
+        """Returns how far the prediction was off."""
+        error, matrix, x = value - self._predicted, self._matrix, self._x
+        g = [_sum([matrix[i][j] * x[i] for i in NEIGHBOURS]) for j in NEIGHBOURS]
+        power = 1.0
+        for i in NEIGHBOURS:
+            power += g[i] * x[i]
+        r = _ratio(1.0, power)
+        for i in NEIGHBOURS:
+            self._w[i] += g[i] * r * error
+            matrix[i] = [(entry - g[i] * g[j] * r) * FORGET for j, entry in enumerate(matrix[i])]
+        self._level = 0.98 * self._level + 0.02 * abs(error)
+        return abs(error)
+
+
+class Entries:
+    """Entries to choose from: two coordinates each, and what is known of how often they come."""
+
+    def __init__(self, first: Floats, second: Floats) -> None:
+        self._places = list(zip(first, second, strict=True))
+        self._steps = [_step(place) for place in first]
+        self._counts, self._roots = [1.0] * len(first), [1.0] * len(first)
+        self._narrow = 0.5
+
+    def weigh(self, p0: float, s0: float, p1: float, s1: float) -> list[int]:
+        """The weights of all entries around an expected place."""
+        self._expected = p0, s0, p1, s1
+        reach = _ratio(REACH, s0)
+        first, end = bisect_left(self._steps, _step(p0 - reach)), bisect_right(self._steps, _step(p0 + reach))
+        heights = [self._kernels(entry) for entry in range(first, end)]
+        near, far = _sum4([near for near, _ in heights]), _sum4([far for _, far in heights])
+        self._f, self._g = self._narrow / near, (1.0 - self._narrow) / far
+        f, g = self._f * WHOLE, self._g * WHOLE
+        weights = [1] * len(self._places)
+        weights[first:end] = [1 + _whole(near * f + far * g) for near, far in heights]
+        return weights
+
+    def _kernels(self, entry: int) -> tuple[float, float]:
+        p0, s0, p1, s1 = self._expected
+        x, y = (self._places[entry][0] - p0) * s0, (self._places[entry][1] - p1) * s1
+        x, y = x * x, y * y
+        a = (1.0 + x * 2.25) * (1.0 + y * 2.25)
+        b = (1.0 + x * 0.25) * (1.0 + y * 0.25)
+        a, b = a * a, b * b
+        c = self._roots[entry] / (a * b)
+        return c * b, c * a
+
+    def learn(self, entry: int) -> None:
+        """That this entry was picked."""
+        near, far = self._kernels(entry)
+        near, far = near * self._f, far * self._g
+        self._narrow = 0.96 * _ratio(near, near + far) + 0.02
+        self._counts[entry] += 1.0
+        self._roots[entry] = math.sqrt(self._counts[entry])
+
+
+def _plane(nodes: int) -> Plane:
+    return [[0.0] * nodes for _ in range(3)], [[0.0] * nodes for _ in range(3)]
+
+
+def _between(axis: list[int], place: int) -> Way:
+    """The nodes on either side of a place within the axis, and the way to the second."""
+    upper = bisect_right(axis, place)
+    if upper == len(axis):
+        return upper - 1, upper - 1, 0.0
+    a, b = axis[upper - 1], axis[upper]
+    return upper - 1, upper, (place - a) / (b - a)
+
+
+def _around(axis: list[int], place: int) -> Way:
+    """The same on an axis that starts at 0 and returns there at FINE."""
+    if place < axis[-1]:
+        return _between(axis, place)
+    return len(axis) - 1, 0, (place - axis[-1]) / (FINE - axis[-1])
+
+
+def _step(place: float) -> int:
+    return _whole(min(max(place * 64.0 + 2048.0, 0.0), 4096.0))
+
+
+def _whole(x: float) -> int:
+    return 0 if math.isnan(x) else int(x)
+
+
+def _ratio(a: float, b: float) -> float:
+    """a / b as IEEE 754 has it, where Python refuses to divide by 0."""
+    return a / b if b else math.copysign(math.inf, b) * a if a else math.nan
+
+
+def _sum(values: Floats) -> float:
+    """One after the other; `sum` would compensate for rounding."""
+    total = 0.0
+    for value in values:
+        total += value
+    return total
+
+
+def _sum4(values: Floats) -> float:
+    a, b, c, d = (_sum(values[lane::4]) for lane in range(4))
+    return (a + b) + (c + d) + 1e-300

@@ -1,0 +1,153 @@
+/**
+ * Material files (.smrl), format 1, for browsers and Node: docs/format.md has every byte.
+ *
+ * decode(arrayBuffer) gives kind ("cells" or "nodes"), name, sha256, notes, interpolation, scale, lattice, lut and index;
+ * of nodes also gains and gainIndex. lut and gains are Float64Arrays, lut in triples. Indices are one for each cell, 0
+ * below the horizon, or one for each node. It throws an Error that says what was expected.
+ */
+import { readNodes } from "./nodes.js";
+
+const ON_HORIZON = 1e-12;
+const MOST_CELLS = 2 ** 22;
+
+export async function decode(arrayBuffer) {
+    const bytes = new Uint8Array(arrayBuffer);
+    const reader = new Reader(bytes);
+    expect(reader.text(4) === "SMRL", "a material file (.smrl), found another kind");
+    const version = reader.number(2);
+    expect(version === 1, `version 1, found version ${version}`);
+    expect(reader.number(4) === crc32(bytes.subarray(10)), "the checksum in the file, found another");
+    const kind = reader.number(1);
+    const name = reader.text(reader.number(1));
+    const digest = reader.number(1);
+    expect(kind < 2 && (digest === 0 || digest === 32), "kind 0 or 1 and a digest of 0 or 32 bytes, found others");
+    const sha256 = Array.from(reader.take(digest), (byte) => byte.toString(16).padStart(2, "0")).join("");
+    const notes = object(JSON.parse(reader.text(reader.number(2)) || "{}"));
+    const known = { name, sha256, notes: { options: object(notes.options ?? {}), metrics: object(notes.metrics ?? {}) } };
+    return { ...known, ...(kind ? nodes(reader) : await cells(reader)) };
+}
+
+function nodes(reader) {
+    const scale = new DataView(reader.take(4).slice().buffer).getFloat32(0, true);
+    expect(scale > 0 && scale < Infinity, `a positive scale, found ${scale}`);
+    const { lattice, gainCodes, shapeCodes, gainIndex, index } = readNodes(reader.rest());
+    const gains = Float64Array.from(gainCodes, (code) => 0.5 * (2 ** (code >> 7) * (1 + (code & 127) / 128) - 1));
+    const lut = Float64Array.from(shapeCodes.flatMap(shape));
+    return { kind: "nodes", interpolation: "trilinear", scale, lattice, gains, lut, gainIndex, index };
+}
+
+function shape([first, second]) {
+    const green = 1 + ((second / 64) * 2) / 3;
+    return [(3 - green + first / 64) / 2, green, (3 - green - first / 64) / 2];
+}
+
+async function cells(reader) {
+    const [thetaH, thetaD, phiD, reciprocal, trilinear, clusters] = [2, 2, 2, 1, 1, 4].map((n) => reader.number(n));
+    const size = thetaH * thetaD * phiD;
+    expect(size > 0 && size <= MOST_CELLS, `a lattice of 1 to ${MOST_CELLS} cells, found ${size}`);
+    expect(clusters > 0 && clusters <= 65536, `a LUT of 1 to 65536 entries, found ${clusters}`);
+    expect(reciprocal < 2 && trilinear < 2, "flags of 0 or 1, found others");
+    const lattice = { thetaH, thetaD, phiD, reciprocal: reciprocal === 1 };
+    const above = aboveHorizon(lattice);
+    const width = clusters <= 256 ? 1 : 2;
+    const payload = await inflated(reader.rest(), 24 * clusters + width * above.length);
+    const view = new DataView(payload.buffer);
+    const lut = Float64Array.from({ length: 3 * clusters }, (_, i) => view.getFloat64(8 * i, true));
+    expect(lut.every((x) => x >= 0 && x < Infinity), "LUT entries that are finite and not negative, found others");
+    const index = width === 1 ? new Uint8Array(size) : new Uint16Array(size);
+    above.forEach((cell, i) => {
+        const at = 24 * clusters + width * i;
+        index[cell] = width === 1 ? payload[at] : view.getUint16(at, true);
+        expect(index[cell] < clusters, `indices below ${clusters}, found ${index[cell]}`);
+    });
+    const interpolation = trilinear ? "trilinear" : "nearest";
+    return { kind: "cells", interpolation, scale: 1, lattice, lut, index };
+}
+
+/** The numbers of the cells above the horizon. */
+function aboveHorizon({ thetaH, thetaD, phiD, reciprocal }) {
+    const centres = (bins, angle) => Float64Array.from({ length: bins }, (_, i) => angle((i + 0.5) / bins));
+    const h = centres(thetaH, (x) => x * x * (Math.PI / 2));
+    const d = centres(thetaD, (x) => x * (Math.PI / 2));
+    const tilt = centres(phiD, (x) => Math.abs(Math.cos(x * Math.PI * (reciprocal ? 1 : 2))));
+    const numbers = new Uint32Array(thetaH * thetaD * phiD);
+    let found = 0;
+    for (let i = 0, cell = 0; i < thetaH; i++) {
+        for (let j = 0; j < thetaD; j++) {
+            const along = Math.cos(h[i]) * Math.cos(d[j]);
+            const across = Math.sin(h[i]) * Math.sin(d[j]);
+            for (let k = 0; k < phiD; k++, cell++) {
+                if (along - across * tilt[k] > ON_HORIZON) numbers[found++] = cell;
+            }
+        }
+    }
+    return numbers.subarray(0, found);
+}
+
+/** Exactly `expected` bytes, and never many more than that in memory. */
+async function inflated(compressed, expected) {
+    const payload = new Uint8Array(expected);
+    const found = await inflate(compressed, payload);
+    expect(found === expected, `${expected} bytes of LUT and index, found another number`);
+    // The stream ends with the file if it has no end without the last byte; not all decompressors mind what follows.
+    const longer = await inflate(compressed.subarray(0, -1), null).then(() => true, () => false);
+    expect(!longer, "the end of the file after LUT and index, found more");
+    return payload;
+}
+
+async function inflate(compressed, payload) {
+    const stream = new Blob([compressed]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
+    const chunks = stream.getReader();
+    for (let at = 0; ; ) {
+        const { done, value } = await chunks.read();
+        if (done) return at;
+        if (payload && at + value.length > payload.length) {
+            await chunks.cancel();
+            return Infinity;
+        }
+        payload?.set(value, at);
+        at += value.length;
+    }
+}
+
+class Reader {
+    constructor(bytes) {
+        [this.bytes, this.at] = [bytes, 0];
+    }
+
+    take(count) {
+        expect(this.at + count <= this.bytes.length, `${count} more bytes, found ${this.bytes.length - this.at}`);
+        this.at += count;
+        return this.bytes.subarray(this.at - count, this.at);
+    }
+
+    number(count) {
+        return this.take(count).reduceRight((sum, byte) => 256 * sum + byte, 0);
+    }
+
+    text(count) {
+        return new TextDecoder("utf-8", { fatal: true, ignoreBOM: true }).decode(this.take(count));
+    }
+
+    rest() {
+        return this.bytes.subarray(this.at);
+    }
+}
+
+function expect(fine, what) {
+    if (!fine) throw new Error(`expected ${what}`);
+}
+
+function object(value) {
+    expect(value !== null && typeof value === "object" && !Array.isArray(value), "notes of JSON objects, found others");
+    return value;
+}
+
+const CRCS = Uint32Array.from({ length: 256 }, (_, byte) => {
+    for (let i = 0; i < 8; i++) byte = byte & 1 ? (byte >>> 1) ^ 0xedb88320 : byte >>> 1;
+    return byte;
+});
+
+function crc32(bytes) {
+    return ~bytes.reduce((crc, byte) => (crc >>> 8) ^ CRCS[(crc ^ byte) & 255], ~0) >>> 0;
+}

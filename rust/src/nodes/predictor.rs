@@ -1,0 +1,79 @@
+//! What a coordinate of a node is likely to be, learnt from the nodes before it: recursive least squares, exactly as written.
+
+/// What a node is predicted from: differences between its neighbours and the node above it.
+const NEIGHBOURS: usize = 10;
+pub type Row = [f64; NEIGHBOURS];
+const FIRST: Row = [0.5, 0.5, 0.0, 0.0, -0.5, -0.5, 0.0, 0.0, 0.0, 0.0];
+const FORGET: f64 = 1.0005;
+
+/// A predictor of one coordinate: recursive least squares on the neighbours.
+pub struct Predictor {
+    weights: Row,
+    inverse: [Row; NEIGHBOURS],
+    /// The usual error.
+    level: f64,
+    neighbours: Row,
+    predicted: f64,
+    /// The error expected for the present node.
+    scale: f64,
+}
+
+impl Predictor {
+    pub fn new(values: &[f64]) -> Self {
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / count + 1e-4;
+        let mut inverse = [[0.0; NEIGHBOURS]; NEIGHBOURS];
+        for (i, row) in inverse.iter_mut().enumerate() {
+            row[i] = 25.0 / variance;
+        }
+        let level = 0.15 * variance.sqrt();
+        Predictor { weights: FIRST, inverse, level, neighbours: [0.0; NEIGHBOURS], predicted: 0.0, scale: level }
+    }
+
+    /// up: the value that all others are compared with. errors: of the nodes next to it, as far as there are any.
+    #[inline(always)]
+    pub fn predict(&mut self, up: f64, values: Row, errors: &[Option<f64>]) {
+        self.predicted = up;
+        for (i, value) in values.into_iter().enumerate() {
+            self.neighbours[i] = value - up;
+            self.predicted += self.weights[i] * self.neighbours[i];
+        }
+        let (mut sum, mut count) = (0.7 * self.level, 0.7);
+        for error in errors.iter().flatten() {
+            sum += error;
+            count += 1.0;
+        }
+        self.scale = sum / count + 0.02 * self.level + 1e-4;
+    }
+
+    #[inline(always)]
+    pub fn expected(&self) -> (f64, f64) {
+        (self.predicted, 1.0 / self.scale)
+    }
+
+    /// Returns how far the prediction was off.
+    #[inline(always)]
+    pub fn learn(&mut self, value: f64) -> f64 {
+        let error = value - self.predicted;
+        let mut gain = [0.0; NEIGHBOURS];
+        for (row, x) in self.inverse.iter().zip(self.neighbours) {
+            for (g, entry) in gain.iter_mut().zip(row) {
+                *g += entry * x;
+            }
+        }
+        let mut power = 1.0;
+        for (g, x) in gain.iter().zip(self.neighbours) {
+            power += g * x;
+        }
+        let inverse_power = 1.0 / power;
+        for i in 0..NEIGHBOURS {
+            self.weights[i] += gain[i] * inverse_power * error;
+            for j in 0..NEIGHBOURS {
+                self.inverse[i][j] = (self.inverse[i][j] - gain[i] * gain[j] * inverse_power) * FORGET;
+            }
+        }
+        self.level = 0.98 * self.level + 0.02 * error.abs();
+        error.abs()
+    }
+}
