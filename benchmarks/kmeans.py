@@ -9,10 +9,11 @@ import faiss
 import numpy as np
 
 from sommerl import BrdfTable
-from sommerl.som_man.file import FILTERS
 from sommerl.som_man.material import SomManBrdf
 
 ITERATIONS = 20
+# Of xz, as fits indices best: no alignment, no context of neighbouring bytes.
+FILTERS = [{"id": lzma.FILTER_LZMA2, "preset": 9 | lzma.PRESET_EXTREME, "lc": 0, "lp": 0, "pb": 0}]
 
 
 def trained(x: Any, clusters: int) -> Any:
@@ -25,8 +26,8 @@ def trained(x: Any, clusters: int) -> Any:
 def compressed(table: BrdfTable, clusters: int) -> tuple[SomManBrdf, int]:
     """The material whose palette is the means, looked up by the nearest cell, and its bytes.
 
-    The bytes are those of an .xz stream of the palette in float32 and the indices above the horizon, with the filters
-    of .smrl files. The palette is sorted by brightness, as ours is, which makes the indices smoother.
+    The bytes are those of an .xz stream of the palette in float32 and the indices above the horizon. The palette is
+    sorted by brightness, as ours is, which makes the indices smoother.
     """
     above = table.lattice.above_horizon
     rgb = table.values[above]

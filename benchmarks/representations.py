@@ -17,6 +17,9 @@ import sommerl
 from sommerl import Brdf, BrdfTable
 from sommerl.formats import merl, nbrdf
 from sommerl.models.nbrdf import WEIGHTS
+from sommerl.render.compare import judge_on_sphere
+from sommerl.render.environment import default_environment
+from sommerl.som_man.budget import Compressor
 
 PALETTES = (256, 1000)  # of k-means
 NUMBER = 4  # bytes: float32
@@ -42,7 +45,7 @@ class Representation:
 def representations(source: Brdf, stem: str, sizes: Sequence[int], networks: Path | None) -> list[Representation]:
     """All of a material. stem: of its file, under which `networks` (.npz) has it. sizes: of compact files, in bytes."""
     table = BrdfTable.of(source)
-    found = [compact(source, size) for size in sizes]
+    found = list(compact(source, sizes))
     found += preset(table)
     found += [palette(table, clusters) for clusters in PALETTES]
     found += network(stem, networks)
@@ -50,15 +53,20 @@ def representations(source: Brdf, stem: str, sizes: Sequence[int], networks: Pat
     return [*found, *merl_table(table)]
 
 
-def compact(source: Brdf, size: int) -> Representation:
-    """Sommerl's compact file of at most so many bytes, as it is read back."""
-    from sommerl.som_man.budget import CompactOptions, compress
-
+def compact(source: Brdf, sizes: Sequence[int]) -> Generator[Representation]:
+    """Sommerl's compact files of at most so many bytes, as they are read back; seconds with the preparation."""
+    if not sizes:
+        return
     started = time.perf_counter()
-    material, _ = compress(source, CompactOptions(target_size=size))
-    seconds = time.perf_counter() - started
-    brdf, written = stored(material)
-    return Representation("compact", f"compact, at most {size:,} B", brdf, written, seconds, material.bytes_memory)
+    compressor = Compressor(source, quality=judge_on_sphere(source, default_environment()))
+    prepared = time.perf_counter() - started
+    for size in sizes:
+        started = time.perf_counter()
+        _, material = compressor.of_size(size)
+        seconds = prepared + time.perf_counter() - started
+        brdf, written = stored(material)
+        label = f"compact, at most {size:,} B"
+        yield Representation("compact", label, brdf, written, seconds, material.bytes_memory)
 
 
 def preset(table: BrdfTable) -> Generator[Representation]:

@@ -1,10 +1,23 @@
 """Fixtures for all tests."""
 
+import gc
+import sys
+
 import numpy as np
 import pytest
 from helpers import SMALL
 
 from sommerl import BrdfTable
+
+
+@pytest.fixture(autouse=True, scope="module")
+def settle():
+    """Frees Mitsuba's scenes, which are cycles of references, while its threads are at rest, and not at whatever moment
+    of another module's tests: a run of all tests once stood still in one that never touches Mitsuba."""
+    yield
+    if "drjit" in sys.modules:
+        sys.modules["drjit"].sync_thread()
+        gc.collect()
 
 
 @pytest.fixture
