@@ -95,18 +95,20 @@ class Compressor:
     """A source, prepared once: compact materials of any size or quality.
 
     quality: what is measured of candidates, and decides between them; without it, the error of the least squares does.
+    step: called after the preparation and after each candidate.
     Raises MissingDependencyError without SciPy.
     """
 
     def __init__(
-        self, brdf: Brdf, *, seed: int = 0, quality: Quality | None = None, progress: Progress | None = None
+        self, brdf: Brdf, *, seed: int = 0, quality: Quality | None = None, step: Callable[[], None] | None = None
     ) -> None:
         self.tried: list[tuple[int, int, float]] = []
-        self._brdf, self._seed, self._quality, self._progress = brdf, seed, quality, progress
+        self._brdf, self._seed, self._quality = brdf, seed, quality
+        self._step = step or (lambda: None)
         self._sha256: str = getattr(brdf, "source_sha256", "")
         self._problems: dict[int, Problem] = {}
         self._fitter = Fitter(brdf, seed=seed)
-        self._advance()
+        self._step()
 
     def of_size(self, size: int) -> tuple[float, SomManBrdf]:
         """The best of several lattices in at most so many bytes, and its quality.
@@ -164,12 +166,8 @@ class Compressor:
         quality = self._quality(material) if self._quality else -error
         written = head + len(stream)
         self.tried.append((written, problem.lattice.size, quality))
-        self._advance()
+        self._step()
         return (quality if written <= size else -math.inf), material
-
-    def _advance(self) -> None:
-        if self._progress:
-            self._progress(1 + len(self.tried), 1 + MOST_TRIES)
 
 
 def compress(
@@ -188,13 +186,21 @@ def compress(
     if options.target_size is None and quality is None:
         raise OptionError("target_psnr: expected a function that measures it, found none")
     started = time.perf_counter()
-    compressor = Compressor(brdf, seed=options.seed, quality=quality, progress=progress)
+    steps, done = 1 + (len(SPREAD) if options.target_size is not None else MOST_TRIES), 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        if progress:
+            progress(done, steps)
+
+    compressor = Compressor(brdf, seed=options.seed, quality=quality, step=step)
     if options.target_size is not None:
         found, material = compressor.of_size(options.target_size)
     else:
         found, material = compressor.of_quality(options.target_psnr or DEFAULT_PSNR)
     if progress:
-        progress(1, 1)
+        progress(steps, steps)
     seconds = time.perf_counter() - started
     return material, CompactReport(found if quality else None, seconds, compressor.tried)
 
