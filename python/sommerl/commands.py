@@ -127,7 +127,7 @@ def info(options: Namespace) -> dict[str, Any]:
     on_disk = path.stat().st_size if path.is_file() else None
     result = describe(brdf, on_disk)
     if not options.json:
-        shown = {key: value for key, value in result.items() if value is not None and key != "facts"}
+        shown = {key: value for key, value in result.items() if value not in (None, {}) and key != "facts"}
         for key in ("bytes_paper", "bytes_memory", "bytes_disk"):
             if key in shown:
                 shown[key] = console.size(shown[key])
