@@ -142,6 +142,15 @@ def test_what_is_not_reciprocal_is_averaged():
     assert np.median(material.eval(A, B)) == pytest.approx(0.2, rel=0.02)
 
 
+def test_one_pure_colour():
+    source = lambertian_table(0.5)
+    source.values[..., 1:] = 0
+    material, _ = compress(source, CompactOptions(target_size=600))
+    found = material.eval(A, B)
+    assert np.median(found[:, 0]) == pytest.approx(0.5 / np.pi, rel=0.02)
+    assert found[:, 1:].max() < 1e-3 * 0.5 / np.pi
+
+
 def test_what_decides_is_handed_in():
     seen = []
 

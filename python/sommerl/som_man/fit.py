@@ -56,9 +56,12 @@ class Fitter:
         axes = np.arange(FINE + 1.0), np.arange(0.0, FINE + 1, 3.0), np.arange(0.0, FINE, 4.0)
         wi, wo, f_damped = self._source(*axes)
         seen = np.minimum(wi[2], wo[2]) > SMALLEST_COSINE
-        self.scale = float(np.float32(np.median(f_damped[seen])))  # as a file holds it
-        if not self.scale > 0:
-            raise MaterialError(f"{brdf.name}: expected a positive reflectance for most directions, found less")
+        values = f_damped[seen]
+        if not values.any():
+            raise MaterialError(f"{brdf.name}: expected a positive reflectance in some direction, found none")
+        # The median; of a mirror, or of one pure colour, that of what is not black. As a file holds it.
+        median = np.median(values) or np.median(values[values > 0])
+        self.scale = float(np.float32(median))
         grid = self._scaled(*axes, wi, wo, f_damped)
         self._rows = best_nodes(line_errors(grid.y, grid.weight, 0, self._random), MOST_ROWS)
         some = self._rows[20][0]
