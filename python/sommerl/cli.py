@@ -18,7 +18,7 @@ from .errors import OptionError, SommerlError
 from .lattice import INTERPOLATIONS
 from .materials import NAMES
 from .render.scenes import DEFAULT_SIZE, DEFAULT_SPP
-from .som_man.budget import DEFAULT_PSNR
+from .som_man.budget import DEFAULT_PSNR, LARGEST_SIZE, SMALLEST_SIZE
 from .som_man.options import Order, Rule, Topology, TrainOptions
 
 TRAIN_DEFAULTS = TrainOptions()
@@ -142,7 +142,12 @@ def _compress(add: Any) -> None:
         "file of some kilobytes (paper; compact if there is a target)",
     )
     target = command.add_mutually_exclusive_group()
-    target.add_argument("--target-size", type=int, metavar="BYTES", help="compact: the best file of at most that size")
+    target.add_argument(
+        "--target-size",
+        type=int,
+        metavar="BYTES",
+        help=f"compact: the best file of at most that size ({SMALLEST_SIZE} to {LARGEST_SIZE})",
+    )
     target.add_argument(
         "--target-psnr",
         type=float,
@@ -153,11 +158,11 @@ def _compress(add: Any) -> None:
         "clusters": "paper: M, the number of entries in the palette",
         "epochs": "paper: how often the table is presented",
         "seed": "of directions, first weights and order",
-        "rule": "paper: Eq. 2 as printed; kohonen: without its factor x",
-        "alpha": "first learning rate, above 0, at most 1",
-        "order": "of presentation",
-        "radius": "of the neighbourhood in the first epoch, in units; 0: the winner learns alone",
-        "topology": "how the units are arranged for that",
+        "rule": "paper: Eq. 2 as printed (paper), or without its factor x (kohonen)",
+        "alpha": "paper: first learning rate, above 0, at most 1",
+        "order": "paper: of presentation",
+        "radius": "paper: of the neighbourhood in the first epoch, in units; 0: the winner learns alone",
+        "topology": "paper: how the units are arranged for that",
     }
     allowed = {"rule": get_args(Rule), "order": get_args(Order), "topology": get_args(Topology)}
     for field in fields(TrainOptions):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from argparse import Namespace
 from dataclasses import asdict, fields
@@ -22,7 +23,7 @@ from .describe import (
     text,
     trained,
 )
-from .errors import FormatError, MissingDependencyError, OptionError
+from .errors import FormatError, MaterialError, MissingDependencyError, OptionError, SommerlError
 from .files import check_writable
 from .formats.names import split_member
 from .load import EXTENSIONS, interpolated, load, load_table
@@ -47,20 +48,37 @@ MOST_SPP = 2**20
 def compress(options: Namespace) -> dict[str, Any]:
     targets = options.target_size, options.target_psnr
     compact = (options.preset or ("paper" if targets == (None, None) else "compact")) == "compact"
-    method = (
-        CompactOptions(options.target_size, options.target_psnr, options.seed) if compact else _train_options(options)
-    )
+    method = _compact_options(options) if compact else _train_options(options)
     outputs = _outputs(options.inputs, options.output)
     if len(options.inputs) > 1:
         for source in options.inputs:
             load(source)  # so that a bad one is found before hours are spent on the others
-    results = [
-        compact_one(load(source), output, method, options.json)
-        if isinstance(method, CompactOptions)
-        else compress_one(load_table(source), output, method, options.json)
-        for source, output in zip(options.inputs, outputs, strict=True)
-    ]
+    results: list[dict[str, Any]] = []
+    failed = 0
+    for source, output in zip(options.inputs, outputs, strict=True):
+        try:
+            results.append(_compressed(source, output, method, options.json))
+        except SommerlError as error:  # a target out of one material's reach is no reason to leave out the others
+            if len(options.inputs) == 1:
+                raise
+            failed += 1
+            print(f"error: {error}", file=sys.stderr)
+    if failed:
+        raise MaterialError(f"inputs: expected to compress {len(options.inputs)} materials, found {failed} that failed")
     return results[0] if len(results) == 1 else {"materials": results}
+
+
+def _compressed(source: str, output: Path, method: CompactOptions | TrainOptions, quiet: bool) -> dict[str, Any]:
+    if isinstance(method, CompactOptions):
+        return compact_one(load(source), output, method, quiet)
+    return compress_one(load_table(source), output, method, quiet)
+
+
+def _compact_options(options: Namespace) -> CompactOptions:
+    for name, default in asdict(TrainOptions()).items():
+        if name != "seed" and getattr(options, name) != default:
+            raise OptionError(f"{name}: expected --preset paper, found compact")
+    return CompactOptions(options.target_size, options.target_psnr, options.seed)
 
 
 def _train_options(options: Namespace) -> TrainOptions:
@@ -127,7 +145,7 @@ def info(options: Namespace) -> dict[str, Any]:
     on_disk = path.stat().st_size if path.is_file() else None
     result = describe(brdf, on_disk)
     if not options.json:
-        shown = {key: value for key, value in result.items() if value not in (None, {}) and key != "facts"}
+        shown = {key: value for key, value in result.items() if value not in (None, "", {}) and key != "facts"}
         for key in ("bytes_paper", "bytes_memory", "bytes_disk"):
             if key in shown:
                 shown[key] = console.size(shown[key])

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from helpers import complaint, lambertian_table, must_fail, random_directions
+from helpers import compact_material, complaint, lambertian_table, must_fail, random_directions
 
 from sommerl import BrdfTable, Lattice, builtin, load, save
 from sommerl.cli import main
 from sommerl.errors import MaterialError, OptionError
+from sommerl.nodes import NodeLattice
 from sommerl.som_man import budget, file
 from sommerl.som_man.budget import CompactOptions, compress
 from sommerl.som_man.codes import (
@@ -172,7 +173,32 @@ def test_a_quality():
     material, report = compress(builtin("red-fabric"), CompactOptions(target_psnr=33), quality=quality)
     assert report.psnr_db >= 33
     assert len(file.encode(material)) < 900
-    assert report.psnr_db == quality(material)
+    assert report.psnr_db == pytest.approx(quality(material), abs=1e-3)
+
+
+def test_a_quality_that_grows_slowly():
+    """Only the largest file is good enough."""
+
+    class Slow(budget.Compressor):
+        def __init__(self):
+            self.sizes = []
+
+        def _candidate(self, size, spread):
+            self.sizes.append(size)
+            return 40 + 0.8 * np.log2(size / 2000), None
+
+    slow = Slow()
+    assert slow.of_quality(40 + 0.8 * np.log2(60_000 / 2000))[0] == pytest.approx(44, abs=0.1)
+    assert slow.sizes[-1] == budget.LARGEST_SIZE
+
+
+def test_a_name_that_fills_the_file():
+    source = lambertian_table(0.5)
+    source.name = "x" * 250
+    with pytest.raises(
+        MaterialError, match="expected a size of at least 602 bytes, twice what its name and source take"
+    ):
+        compress(source, CompactOptions(target_size=300))
 
 
 def test_a_quality_out_of_reach(monkeypatch):
@@ -215,10 +241,27 @@ def test_on_the_command_line(capsys, tmp_path):
     assert path.stat().st_size <= 800
 
 
+def test_one_that_fails_does_not_hold_up_the_others(capsys, tmp_path, monkeypatch):
+    def only_fabric(brdf, options, **_):
+        if "fabric" not in brdf.name:
+            raise MaterialError(f"{brdf.name}: out of reach")
+        return compact_material(NodeLattice((0, 180), (0, 0), ((0, 180),), ((0,),)), 2, 2, name="fabric"), report
+
+    report = budget.CompactReport(40.0, 1.0, [])
+    monkeypatch.setattr("sommerl.commands.budget.compress", only_fabric)
+    monkeypatch.setattr("sommerl.commands.judge_on_sphere", lambda *_: None)
+    assert main(["compress", "nickel", "red-fabric", "-o", str(tmp_path), "--preset", "compact"]) == 1
+    error = capsys.readouterr().err
+    assert "nickel (SGD stand-in): out of reach" in error
+    assert "expected to compress 2 materials, found 1 that failed" in error
+    assert [path.name for path in tmp_path.iterdir()] == ["red-fabric.smrl"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
         (["--preset", "paper", "--target-size", "800"], "target_size: expected --preset compact, found paper"),
+        (["--target-size", "800", "--clusters", "9"], "clusters: expected --preset paper, found compact"),
         (["--target-size", "8"], "target_size: expected 300 to 64000, found 8"),
     ],
 )

@@ -75,6 +75,8 @@ class CompactOptions:
         psnr = self.target_psnr
         if psnr is not None and not (isfinite(psnr) and LOWEST_PSNR <= psnr <= HIGHEST_PSNR):
             raise OptionError(f"target_psnr: expected {LOWEST_PSNR:g} to {HIGHEST_PSNR:g}, found {psnr}")
+        if self.target_size is None and psnr is None:
+            object.__setattr__(self, "target_psnr", DEFAULT_PSNR)
         if not 0 <= self.seed <= 2**64 - 1:
             raise OptionError(f"seed: expected 0 to {2**64 - 1}, found {self.seed}")
 
@@ -125,7 +127,7 @@ class Compressor:
         """The smallest material that is good enough, as far as MOST_TRIES find it. Raises MaterialError if none is."""
         low, high = float(SMALLEST_SIZE), float(LARGEST_SIZE)
         size, best, reached = 2000.0, None, -math.inf
-        for _ in range(MOST_TRIES):
+        for tries_left in reversed(range(MOST_TRIES)):
             quality, material = self._candidate(int(size), 1.0)
             reached = max(reached, quality)
             if quality >= wanted:
@@ -136,8 +138,8 @@ class Compressor:
                 break
             guess = size * 2 ** ((wanted - quality + 0.1) / SLOPE)
             size = min(max(guess, low * (high / low) ** 0.2), low * (high / low) ** 0.8)
-            if best is None and guess >= LARGEST_SIZE:
-                size = LARGEST_SIZE
+            if best is None and (guess >= LARGEST_SIZE or tries_left == 1):
+                size = float(LARGEST_SIZE)
         if best is None:
             found = f"{reached:.1f} dB with {LARGEST_SIZE} bytes"
             raise MaterialError(f"{self._brdf.name}: expected at least {wanted:g} dB, found no more than {found}")
@@ -151,6 +153,9 @@ class Compressor:
         problem = self._problems[nodes]
         gains, shapes = (min(MOST_ENTRIES, round(share * math.sqrt(nodes))) for share in (GAINS, SHAPES))
         head = file.head_bytes(self._brdf.name, self._sha256)
+        if size < 2 * head:
+            expected = f"a size of at least {2 * head} bytes, twice what its name and source take"
+            raise MaterialError(f"{self._brdf.name}: expected {expected}, found {size}")
         found, stream = quantise(problem, gains, shapes, size - head, seed=self._seed)
         material = SomManBrdf(
             shape_values(found.shapes),
@@ -163,7 +168,8 @@ class Compressor:
             source_sha256=self._sha256,
         )
         error = problem.error + problem.excess(found.values())
-        quality = self._quality(material) if self._quality else -error
+        # Rounded, so that the last bits of a machine's sums do not decide.
+        quality = round(self._quality(material), 3) if self._quality else -error
         written = head + len(stream)
         self.tried.append((written, problem.lattice.size, quality))
         self._step()
@@ -183,7 +189,7 @@ def compress(
     asked for without it, MaterialError if the target cannot be met, MissingDependencyError without SciPy.
     """
     options = options or CompactOptions()
-    if options.target_size is None and quality is None:
+    if options.target_psnr is not None and quality is None:
         raise OptionError("target_psnr: expected a function that measures it, found none")
     started = time.perf_counter()
     steps, done = 1 + (len(SPREAD) if options.target_size is not None else MOST_TRIES), 0
@@ -195,10 +201,10 @@ def compress(
             progress(done, steps)
 
     compressor = Compressor(brdf, seed=options.seed, quality=quality, step=step)
-    if options.target_size is not None:
-        found, material = compressor.of_size(options.target_size)
+    if options.target_psnr is not None:
+        found, material = compressor.of_quality(options.target_psnr)
     else:
-        found, material = compressor.of_quality(options.target_psnr or DEFAULT_PSNR)
+        found, material = compressor.of_size(options.target_size or LARGEST_SIZE)
     if progress:
         progress(steps, steps)
     seconds = time.perf_counter() - started

@@ -39,6 +39,7 @@ PREFIX = struct.Struct("<4sHI")
 CELLS, NODES = 0, 1
 CELLS_HEAD = struct.Struct("<HHHBBI")
 NODES_HEAD = struct.Struct("<f")
+MOST_BINS = 2**16 - 1  # on an axis
 MOST_CELLS = 2**22  # MERL's larger kind of table has 2,916,000
 LONGEST_FILE = 2 * MOST_CELLS + 24 * 2**16 + 2**20
 LONGEST_NAME, LONGEST_NOTES = 2**8 - 1, 2**16 - 1
@@ -86,7 +87,7 @@ def head_bytes(name: str, source_sha256: str) -> int:
 
 
 def _head(kind: int, name: str, source_sha256: str, notes: bytes) -> bytes:
-    text = name.encode()[:LONGEST_NAME].decode("utf-8", "ignore").encode()
+    text = name.encode("utf-8", "replace")[:LONGEST_NAME].decode("utf-8", "ignore").encode()
     digest = bytes.fromhex(source_sha256)
     if len(notes) > LONGEST_NOTES or len(digest) not in (0, DIGEST_BYTES):
         raise FormatError(f"{name}: expected notes of at most {LONGEST_NOTES} bytes, found {len(notes)}")
@@ -146,7 +147,7 @@ BYTE, SHORT = struct.Struct("<B"), struct.Struct("<H")
 
 def _material(reader: _Reader) -> SomManBrdf:
     (kind,) = reader.unpack(BYTE)
-    name = reader.take(*reader.unpack(BYTE)).decode()
+    name = "".join(c if c.isprintable() else "�" for c in reader.take(*reader.unpack(BYTE)).decode())
     (digest,) = reader.unpack(BYTE)
     if kind not in (CELLS, NODES) or digest not in (0, DIGEST_BYTES):
         raise FormatError(f"expected kind 0 or 1 and a digest of 0 or 32 bytes, found kind {kind} and {digest} bytes")
@@ -169,6 +170,8 @@ def _object(value: Any) -> dict[str, Any]:
 
 def _cells(material: SomManBrdf) -> bytes:
     lattice = material.grid or Lattice()
+    if lattice.size > MOST_CELLS or max(lattice.shape) > MOST_BINS:
+        raise FormatError(f"{material.name}: expected at most {MOST_CELLS} cells, found {lattice.shape}")
     index = material.index[lattice.above_horizon]
     payload = material.lut.astype("<f8").tobytes() + index.astype(index.dtype.newbyteorder("<")).tobytes()
     packer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS, 9)

@@ -51,7 +51,7 @@ class SomManBrdf(OnLattice):
         self.lut = np.array(lut, np.float64)
         self.gains = np.array(gains, np.float64)
         self.lattice = lattice
-        self.scale = scale
+        self.scale = float(np.float32(scale))  # as a file holds it
         self.interpolation = "trilinear" if isinstance(lattice, NodeLattice) else "nearest"
         self.options = dict(options or {})
         self.metrics = dict(metrics or {})
@@ -64,7 +64,7 @@ class SomManBrdf(OnLattice):
             self._index = self._entries("LUT", index, len(self.lut), np.dtype(np.uint16))
             gain_index = np.zeros(0, np.uint16) if gain_index is None else gain_index
             self.gain_index = self._entries("gains", gain_index, len(self.gains), np.dtype(np.uint16))
-            if not (np.isfinite(self.gains).all() and (self.gains >= 0).all() and 0 < scale < np.inf):
+            if not (np.isfinite(self.gains).all() and (self.gains >= 0).all() and 0 < self.scale < np.inf):
                 raise MaterialError(f"{name}: expected gains that are not negative, and a positive scale, found others")
         else:
             self._index = self._cells(index, lattice)
