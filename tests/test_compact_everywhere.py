@@ -190,3 +190,8 @@ def test_mitsuba_is_told_that_there_is_no_nearest_node(path):
 def test_a_compressed_material_is_copied_as_it_is(capsys, path, tmp_path):
     assert run(capsys, "convert", path, tmp_path / "other.smrl")[0] == 0
     assert (tmp_path / "other.smrl").read_bytes() == path.read_bytes()
+
+
+def test_a_name_cannot_give_orders_to_a_terminal(tmp_path):
+    save(compact_material(LATTICE, 5, 4, name="\x1b]0;evil\x07\nx"), tmp_path / "x.smrl")
+    assert load(tmp_path / "x.smrl").name == "�]0;evil��x"

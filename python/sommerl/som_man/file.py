@@ -66,9 +66,12 @@ def load(path: str | Path) -> SomManBrdf:
     if length > LONGEST_FILE:
         raise FormatError(f"{path}: expected at most {LONGEST_FILE} bytes, found {length}")
     try:
-        return decode(path.read_bytes())
+        material = decode(path.read_bytes())
     except SommerlError as error:
         raise FormatError(f"{path}: {error}") from error
+    # Names are shown on terminals, which obey some of what cannot be printed.
+    material.name = "".join(c if c.isprintable() else "�" for c in material.name)
+    return material
 
 
 def encode(material: SomManBrdf) -> bytes:
@@ -147,7 +150,7 @@ BYTE, SHORT = struct.Struct("<B"), struct.Struct("<H")
 
 def _material(reader: _Reader) -> SomManBrdf:
     (kind,) = reader.unpack(BYTE)
-    name = "".join(c if c.isprintable() else "�" for c in reader.take(*reader.unpack(BYTE)).decode())
+    name = reader.take(*reader.unpack(BYTE)).decode()
     (digest,) = reader.unpack(BYTE)
     if kind not in (CELLS, NODES) or digest not in (0, DIGEST_BYTES):
         raise FormatError(f"expected kind 0 or 1 and a digest of 0 or 32 bytes, found kind {kind} and {digest} bytes")
