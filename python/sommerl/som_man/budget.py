@@ -21,7 +21,7 @@ from . import file
 from .codes import gain_values, shape_values
 from .fit import LARGEST, SMALLEST, Fitter
 from .material import SomManBrdf
-from .quantise import Problem, quantise
+from .quantise import quantise
 
 Quality = Callable[[SomManBrdf], float]  #: of a candidate, in decibels
 Progress = Callable[[int, int], None]  #: steps done, steps in all
@@ -108,7 +108,6 @@ class Compressor:
         self._brdf, self._seed, self._quality = brdf, seed, quality
         self._step = step or (lambda: None)
         self._sha256: str = getattr(brdf, "source_sha256", "")
-        self._problems: dict[int, Problem] = {}
         self._fitter = Fitter(brdf, seed=seed)
         self._step()
 
@@ -148,9 +147,7 @@ class Compressor:
     def _candidate(self, size: int, spread: float) -> tuple[float, SomManBrdf]:
         """A material of at most so many bytes, with more or fewer nodes than usual; -inf if it is larger."""
         nodes = int(np.clip(spread * usual_nodes(size), SMALLEST, LARGEST))
-        if nodes not in self._problems:
-            self._problems = {nodes: self._fitter.problem(nodes)}
-        problem = self._problems[nodes]
+        problem = self._fitter.problem(nodes)
         gains, shapes = (min(MOST_ENTRIES, round(share * math.sqrt(nodes))) for share in (GAINS, SHAPES))
         head = file.head_bytes(self._brdf.name, self._sha256)
         if size < 2 * head:
