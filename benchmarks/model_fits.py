@@ -1,4 +1,5 @@
-"""Analytic models fitted to a material: GGX (7 numbers) and SGD (30 numbers).
+"""Analytic models fitted to a material: GGX over a Lambertian base (8 numbers), as `sommerl fit --loss cube-root` does
+it, and SGD (30 numbers), of which the rest of this page tells.
 
 Directions: PAIRS random pairs above the horizon. Half of them are two cosine-weighted directions; the other half are
 uniform in √θ_h, θ_d and φ_d, as MERL's cells are, so that a narrow highlight is seen, too.
@@ -6,10 +7,9 @@ uniform in √θ_h, θ_d and φ_d, as MERL's cells are, so that a narrow highlig
 Loss: the sum of squared differences of ∛(f_r cos θ_i cos θ_o). A cube root is much like a logarithm, but takes zeros,
 and does not let the highlight's few large values decide alone.
 
-Search: SciPy's `least_squares` ("trf", with bounds). All starts go a short way on a tenth of the pairs; the best of
-them goes on with all. GGX's channels share a roughness and are fitted together; SGD's have nothing in common and are
-fitted one by one. SGD's κ is 1: it and ρ_s are one factor. Its c is (θ₁ − θ₀)^−k: shadowing begins at θ₀ and is under
-way at θ₁.
+Search: SciPy's `least_squares` ("trf", with bounds), channel by channel. All starts go a short way on a tenth of the
+pairs; the best of them goes on with all. κ is 1: it and ρ_s are one factor. c is (θ₁ − θ₀)^−k: shadowing begins at θ₀
+and is under way at θ₁.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from scipy.optimize import least_squares
 
 from sommerl import Brdf
 from sommerl.arrays import split
+from sommerl.fitting import FitOptions, fit
 from sommerl.half_diff import directions
-from sommerl.models.ggx import Ggx
 from sommerl.models.sgd import PARAMETERS, Angles, ShiftedGamma, channel
 
 Array = NDArray[np.float64]
@@ -32,32 +32,17 @@ Residuals = Callable[[Array, int], Array]  #: for parameters, at every so maniet
 
 PAIRS, FEW = 20_000, 10  # the starts are compared at every tenth pair
 SHORT_EVALUATIONS, LONG_EVALUATIONS = 40, 100
-GGX_PARAMETERS, SGD_PARAMETERS = 7, 30
-GGX_STARTS = (0.02, 0.1, 0.4)  # α
+GGX_PARAMETERS, SGD_PARAMETERS = 8, 30
+GGX_SAMPLES = 200_000
 SGD_STARTS = ((2e-4, 0.3), (2e-4, 1.0), (0.01, 0.5), (0.05, 1.0), (0.3, 0.5))  # α, p
 # ρ_d, log ρ_s, log α, p, f0, f1, λ, θ₁ − θ₀, k, θ₀: the range of what Bagher et al. publish, and more.
 SGD_LOW = (0.0, -25.0, -12.0, 0.0, 0.0, -1.0, 0.0, 0.3, 0.5, -0.8)
 SGD_HIGH = (2.0, 20.0, 1.0, 6.0, 2.0, 2.0, 50.0, 3.0, 400.0, 1.3)
 
 
-def fitted_ggx(brdf: Brdf) -> Ggx:
+def fitted_ggx(brdf: Brdf) -> Brdf:
     """The Lambertian base and GGX lobe nearest to a material."""
-    wi, wo = pairs()
-    f_r = brdf.eval(wi, wo)
-    cosines = (wi[:, 2] * wo[:, 2])[:, None]
-    measured = np.cbrt(f_r * cosines)
-
-    def residuals(x: Array, step: int) -> Array:
-        modelled = _ggx(x).eval(wi[::step], wo[::step])
-        return (np.cbrt(modelled * cosines[::step]) - measured[::step]).ravel()
-
-    albedo = np.clip(np.pi * np.median(f_r, axis=0), 1e-3, 0.9)
-    starts = [(*albedo, *([0.1] * 3), np.log(alpha)) for alpha in GGX_STARTS]
-    return _ggx(_best(residuals, starts, [0.0] * 6 + [-8.0], [2.0] * 3 + [1.0] * 3 + [0.5]), brdf.name)
-
-
-def _ggx(x: Array, name: str = "") -> Ggx:
-    return Ggx(f"{name} (GGX fit)", x[:3], x[3:6], np.exp(x[6]))
+    return fit(brdf, "ggx", FitOptions(loss="cube-root", samples=GGX_SAMPLES)).brdf
 
 
 def fitted_sgd(brdf: Brdf) -> ShiftedGamma:

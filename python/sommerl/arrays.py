@@ -20,7 +20,7 @@ Triple = tuple[Array, Array, Array]  #: x, y, z of directions, or r, g, b of ref
 class NumpyOps:
     """Array functions, on NumPy arrays."""
 
-    sqrt, sin, cos, exp, power = np.sqrt, np.sin, np.cos, np.exp, np.power
+    sqrt, sin, cos, exp, log, power = np.sqrt, np.sin, np.cos, np.exp, np.log, np.power
     atan2, floor = np.arctan2, np.floor
     minimum, maximum = np.minimum, np.maximum
     where = staticmethod(np.where)
@@ -53,7 +53,14 @@ class DrjitOps:
 
     def __init__(self, dr: Any) -> None:
         self._dr = dr
-        self.sqrt, self.sin, self.cos, self.exp, self.power = dr.sqrt, dr.sin, dr.cos, dr.exp, dr.power
+        self.sqrt, self.sin, self.cos, self.exp, self.log, self.power = (
+            dr.sqrt,
+            dr.sin,
+            dr.cos,
+            dr.exp,
+            dr.log,
+            dr.power,
+        )
         self.atan2, self.floor = dr.atan2, dr.floor
         self.minimum, self.maximum, self.where = dr.minimum, dr.maximum, dr.select
 

@@ -15,20 +15,24 @@ from typing import Any, NoReturn, get_args
 
 from . import __version__, commands, convert, demo
 from .errors import OptionError, SommerlError
+from .fitting.options import MOST_LOBES, FitOptions, Loss, Sampling
 from .lattice import INTERPOLATIONS
 from .materials import NAMES
+from .models.multi_lobe import FAMILIES
+from .paper import report
 from .render.scenes import DEFAULT_SIZE, DEFAULT_SPP
 from .som_man.budget import DEFAULT_PSNR, LARGEST_SIZE, SMALLEST_SIZE
 from .som_man.options import Order, Rule, Topology, TrainOptions
 
-TRAIN_DEFAULTS = TrainOptions()
+TRAIN_DEFAULTS, FIT_DEFAULTS = TrainOptions(), FitOptions()
 
 DESCRIPTION = """\
 Turns measured reflectance into small material files that render fast and look like the measurement.
 
 A MATERIAL is a file, told by its content, or the name of a built-in one. Files: Sommerl's .smrl, MERL .binary,
 RGL .bsdf (isotropic), Cornell .brdf, tables of samples (.csv .npy .npz, with columns theta_i_deg, phi_i_deg,
-theta_o_deg, phi_o_deg, r, g, b), and neural BRDFs (.npy .npz .h5; of an archive with several, FILE.npz:NAME)."""
+theta_o_deg, phi_o_deg, r, g, b), neural BRDFs (.npy .npz .h5; of an archive with several, FILE.npz:NAME), and
+fits (.json; of several, FILE.json:MODEL)."""
 
 BUILT_IN = "Built-in materials (SGD stand-ins for measured ones):\n  " + "\n  ".join(
     ", ".join(NAMES[i : i + 5]) for i in range(0, len(NAMES), 5)
@@ -99,7 +103,7 @@ def _parser() -> Parser:
     )
     parser.add_argument("--version", action="version", version=f"sommerl {__version__}")
     add = parser.add_subparsers(metavar="COMMAND", required=True, dest="command").add_parser
-    for build in (_demo, _compress, _info, _convert, _compare, _render):
+    for build in (_demo, _compress, _info, _convert, _compare, _fit, _render, _paper):
         build(add)
     return parser
 
@@ -234,6 +238,83 @@ def _render(add: Any) -> None:
         help="how it is looked up (tables: trilinear)",
     )
     _rendering(command)
+
+
+def _fit(add: Any) -> None:
+    summary = "Fits analytic models to a material, and says how far each is from it: would a formula do?"
+    example = """sommerl fit nickel.binary --model ward --lobes 3
+  sommerl fit nickel.binary -o nickel.json --picture nickel.png
+  sommerl render nickel.json:ggx -o ggx.png"""
+    command = _command(add, "fit", commands.fit, summary, example)
+    command.epilog = f"Models:\n{_families()}\n\n{command.epilog}"
+    command.add_argument("material", metavar="MATERIAL")
+    command.add_argument("--model", default="all", metavar="NAME", help="one of the models below, or all (%(default)s)")
+    command.add_argument(
+        "--lobes",
+        type=int,
+        metavar="N",
+        help=f"of a model, with its Lambertian base: 2 to {MOST_LOBES} (2; 1 of models that are a base themselves)",
+    )
+    for name, allowed, text in (
+        ("loss", Loss, "what the error is of: f_r; f_r cos θ_i; the logarithm of that, or its cube root"),
+        ("sampling", Sampling, "directions that a rendered sphere sees, or the centres of the lattice's cells"),
+    ):
+        default = getattr(FIT_DEFAULTS, name)
+        command.add_argument(f"--{name}", choices=get_args(allowed), default=default, help=f"{text} (%(default)s)")
+    for name, text in (
+        ("samples", "pairs of directions, for --sampling sphere"),
+        ("starts", "of the search, of each model"),
+        ("seed", "of directions and starts"),
+    ):
+        default = getattr(FIT_DEFAULTS, name)
+        command.add_argument(f"--{name}", type=int, default=default, metavar="N", help=f"{text} (%(default)s)")
+    command.add_argument(
+        "--conserve-energy", action="store_true", help="let the albedos of each channel sum to 1 at most"
+    )
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="a .json with everything; FILE.json:MODEL is a material"
+    )
+    command.add_argument(
+        "--picture", type=Path, metavar="FILE", help="a .png of the material, its fits and differences"
+    )
+
+
+def _paper(add: Any) -> None:
+    summary = "Makes the paper's tables and figures again, beside the figures that it prints."
+    command = _command(add, "paper", report.paper, summary, "sommerl paper table1 --data MERL -o paper")
+    listed = "\n".join(f"  {name:8}{title}" for name, (title, _) in report.ITEMS.items())
+    command.epilog = f"Items:\n{listed}\n\n{command.epilog}"
+    command.add_argument("item", choices=[*report.ITEMS, "all"], nargs="?", default="all", help="(%(default)s)")
+    command.add_argument(
+        "--data",
+        type=Path,
+        metavar="DIR",
+        help="a folder with a file for each material, like purple-paint.binary, or an .npz archive of neural BRDFs; "
+        "if not given, the built-in stand-ins",
+    )
+    command.add_argument(
+        "-o",
+        "--out",
+        type=Path,
+        default=Path("paper"),
+        metavar="DIR",
+        help="folder for tables and pictures (%(default)s)",
+    )
+    for name, text in (
+        ("samples", "pairs of directions that models are fitted to"),
+        ("seed", "of directions and starts"),
+    ):
+        default = getattr(FIT_DEFAULTS, name)
+        command.add_argument(f"--{name}", type=int, default=default, metavar="N", help=f"{text} (%(default)s)")
+
+
+def _families() -> str:
+    """All models, with their parameters and bounds."""
+    lines: list[str] = []
+    for name, family in FAMILIES.items():
+        shape = ", ".join(f"{p.name} {p.low:g} to {p.high:g}" for p in family.parameters)
+        lines.append(f"  {name:20}{shape}".rstrip())
+    return "\n".join(lines)
 
 
 def _rendering(command: Any) -> None:

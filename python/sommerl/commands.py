@@ -9,7 +9,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-from . import console
+from . import console, plots
 from .brdf import Brdf, OnLattice
 from .describe import (
     compact_rows,
@@ -19,15 +19,20 @@ from .describe import (
     image_rows,
     label,
     lookup,
+    print_fits,
     table_rows,
     text,
     trained,
 )
 from .errors import FormatError, MaterialError, MissingDependencyError, OptionError, SommerlError
 from .files import check_writable
+from .fitting.fit import fit_models
+from .fitting.options import FitOptions, all_models, families_of
+from .formats import fits
 from .formats.names import split_member
 from .load import EXTENSIONS, interpolated, load, load_table
 from .metrics import exposure, table_metrics, to_srgb8
+from .models.multi_lobe import MultiLobe
 from .render.compare import compare_on_sphere, judge_on_sphere
 from .render.environment import default_environment, load_environment
 from .render.images import side_by_side, write_image
@@ -145,11 +150,15 @@ def info(options: Namespace) -> dict[str, Any]:
     on_disk = path.stat().st_size if path.is_file() else None
     result = describe(brdf, on_disk)
     if not options.json:
-        shown = {key: value for key, value in result.items() if value not in (None, "", {}) and key != "facts"}
+        shown = {
+            key: value for key, value in result.items() if value not in (None, "", {}) and key not in ("facts", "lobes")
+        }
         for key in ("bytes_paper", "bytes_memory", "bytes_disk"):
             if key in shown:
                 shown[key] = console.size(shown[key])
         rows = {key: text(value) for key, value in shown.items()} | fact_rows(result["facts"] or {})
+        if isinstance(brdf, MultiLobe):
+            rows |= {f"lobe {number}": str(lobe) for number, lobe in enumerate(brdf.lobes, 1)}
         console.print_rows(str(options.material), rows)
     return result
 
@@ -181,6 +190,32 @@ def compare(options: Namespace) -> dict[str, Any]:
         lookups = dict.fromkeys((lookup(reference), lookup(candidate)))
         rows = {"lookup": " against ".join(lookups)} | image_rows(comparison.metrics) | table_rows(metrics)
         console.print_rows(f"{options.reference} against {options.candidate}", rows)
+    return result
+
+
+def fit(options: Namespace) -> dict[str, Any]:
+    for path, extension in ((options.output, ".json"), (options.picture, ".png")):
+        if path:
+            check_output(path, (extension,), options.material)
+    chosen = FitOptions(**{field.name: getattr(options, field.name) for field in fields(FitOptions)})
+    models = [options.model] if options.model != "all" else all_models(chosen.lobes)
+    families_of(models[0], chosen.lobes, alone=len(models) == 1)  # an unknown one is better told before reading
+    brdf = load(options.material)
+    with console.progress(f"fitting {brdf.name}") as advance:
+        found = sorted(fit_models(brdf, models, chosen, progress=advance), key=lambda fit: fit.error)
+    result = fits.content(brdf.name, [each.as_json() for each in found])
+    if options.picture:
+        with console.progress("rendering") as advance:
+            comparisons = compare_on_sphere(
+                brdf, [each.brdf for each in found], default_environment(), progress=advance
+            )
+        for row, comparison in zip(result["fits"], comparisons, strict=True):
+            row["psnr_object_db"] = comparison.metrics.psnr_object_db
+        plots.fits(brdf.name, [each.model for each in found], comparisons, options.picture)
+    if options.output:
+        fits.write(options.output, brdf.name, result["fits"])
+    if not options.json:
+        print_fits(f"{options.material}: {chosen.loss} error of fits", result["fits"], found)
     return result
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 from . import console
 from .brdf import Brdf, OnLattice
+from .fitting.fit import Fit
 from .formats.rgl import RglBrdf
 from .metrics import ImageMetrics, table_metrics
+from .models.multi_lobe import MultiLobe
 from .nodes import NodeLattice
 from .som_man.budget import CompactReport
 from .som_man.material import SomManBrdf
@@ -35,12 +37,14 @@ def trained(table: BrdfTable, options: TrainOptions) -> tuple[SomManBrdf, TrainR
 def describe(brdf: Brdf, bytes_disk: int | None) -> dict[str, Any]:
     """What `info` says of a material; null where a kind of material has no such thing."""
     known: dict[str, Any] = dict.fromkeys(("clusters", "lattice", "nodes", "interpolation", "domain", "bytes_paper"))
-    known |= dict.fromkeys(("bytes_memory", "options", "metrics", "source_sha256", "cells_clamped"))
+    known |= dict.fromkeys(("bytes_memory", "options", "metrics", "source_sha256", "cells_clamped", "lobes"))
     kind = "measurement" if isinstance(brdf, RglBrdf) else "model"
     if isinstance(brdf, SomManBrdf):
         kind = "som-man"
         known |= {"clusters": brdf.clusters, "domain": brdf.domain, "bytes_paper": brdf.bytes_paper}
         known |= {"bytes_memory": brdf.bytes_memory, "options": brdf.options, "metrics": brdf.metrics}
+    if isinstance(brdf, MultiLobe):
+        known["lobes"] = [lobe.as_json() for lobe in brdf.lobes]
     if isinstance(brdf, BrdfTable):
         kind = "table"
         known |= {"domain": "linear", "bytes_memory": brdf.values.nbytes, "cells_clamped": brdf.cells_clamped}
@@ -141,3 +145,17 @@ def image_rows(metrics: ImageMetrics) -> dict[str, str]:
         "ΔE_ITP": f"{metrics.delta_e_itp:.2f}",
         "FLIP": f"{metrics.flip:.4f}",
     }
+
+
+def print_fits(title: str, rows: Sequence[Mapping[str, Any]], fits: Sequence[Fit]) -> None:
+    """A table of fits, and their lobes. rows: of `Fit.as_json`, with "psnr_object_db" if that was measured."""
+    rendered = "psnr_object_db" in rows[0]
+    columns = ["model", "lobes", "error", "relative", *(["PSNR, object"] if rendered else []), "time"]
+    table: list[list[str]] = []
+    for row, fit in zip(rows, fits, strict=True):
+        psnr = [console.decibels(row["psnr_object_db"])] if rendered else []
+        numbers = [str(row["lobes"]), f"{fit.error:.4g}", f"{fit.relative_error:.4f}", *psnr, f"{fit.seconds:.1f} s"]
+        table.append([fit.model, *numbers])
+    console.print_table(title, columns, table)
+    for fit in fits:
+        print("\n  ".join([fit.model, *map(str, fit.brdf.lobes)]))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 from .brdf import Brdf, OnLattice
 from .errors import FormatError, MaterialError
-from .formats import arrays_on_disk, cornell, merl, nbrdf, rgl, samples
+from .formats import arrays_on_disk, cornell, fits, merl, nbrdf, rgl, samples
 from .formats.names import split_member
 from .lattice import Interpolation
 from .materials import NAMES, builtin
@@ -15,14 +16,15 @@ from .som_man import file as smrl
 from .table import BrdfTable
 
 HEAD_BYTES = 4096
-EXTENSIONS = (".smrl", ".binary", ".bsdf", ".brdf", ".csv", ".npy", ".npz", ".h5", ".hdf5")  # what `load` reads
+# What `load` reads.
+EXTENSIONS = (".smrl", ".binary", ".bsdf", ".brdf", ".csv", ".npy", ".npz", ".h5", ".hdf5", ".json")
 
 
 def load(source: str | Path) -> Brdf:
     """The material in a file of any known format, told by its content, or the built-in one of that name.
 
-    Of an archive of neural BRDFs, "FILE.npz:NAME" is one. Raises FormatError for a file in no known format,
-    MaterialError for a name that is neither file nor built-in.
+    Of an archive of neural BRDFs, "FILE.npz:NAME" is one; of a file of fits, "FILE.json:MODEL". Raises FormatError for
+    a file in no known format, MaterialError for a name that is neither file nor built-in.
     """
     path, member = split_member(source)
     if str(source) in NAMES and not path.is_file():
@@ -45,6 +47,8 @@ def load(source: str | Path) -> Brdf:
 
 def _read(path: Path, head: bytes, member: str) -> Brdf:
     """The material in a file that starts with `head`."""
+    if fits.looks_like(head):
+        return fits.read(path, member)
     if member and not head.startswith(arrays_on_disk.ZIP_MAGIC):
         raise FormatError(f"{path}: expected an archive of materials, to take {member} from it, found one material")
     if smrl.looks_like(head):
@@ -76,13 +80,14 @@ def _numpy(path: Path, member: str) -> Brdf:
 
 def _named(path: Path) -> Brdf:
     """A file whose content says nothing: its reader, by its name, says what is wrong with it."""
-    reader = {".binary": merl.read, ".bsdf": rgl.read, ".brdf": cornell.read, ".csv": samples.read}
+    reader: dict[str, Callable[[Path], Brdf]] = {".binary": merl.read, ".bsdf": rgl.read, ".brdf": cornell.read}
+    reader |= {".csv": samples.read, ".json": fits.read}
     reader |= dict.fromkeys((".npy", ".npz", ".h5", ".hdf5"), nbrdf.read)
     if path.suffix.lower() in reader:
         return reader[path.suffix.lower()](path)
     raise FormatError(
         f"{path}: expected a material (.smrl, MERL .binary, RGL .bsdf, Cornell .brdf, samples .csv .npy .npz, neural "
-        "BRDF .npy .npz .h5), found none of these"
+        "BRDF .npy .npz .h5, fits .json), found none of these"
     )
 
 

@@ -205,8 +205,9 @@ def test_scalar_mode_warns_and_gives_the_same():
 import warnings
 import numpy as np
 from sommerl import builtin, BrdfTable, Lattice
+from sommerl import jit
 from sommerl.render import llvm
-llvm.find_llvm = lambda: None
+jit.find_llvm = lambda: None
 with warnings.catch_warnings(record=True) as caught:
     warnings.simplefilter("always")
     mi = llvm.mitsuba()

@@ -1,14 +1,15 @@
 import pytest
 
+from sommerl import jit
 from sommerl.errors import MissingDependencyError
 from sommerl.render import llvm
 
 
 def test_the_one_in_use_is_new_enough():
     assert llvm.mitsuba().variant() in ("cuda_ad_rgb", "llvm_ad_rgb")
-    path = llvm.find_llvm()
+    path = jit.find_llvm()
     assert path is not None
-    assert llvm.llvm_version(path) >= 17
+    assert jit.llvm_version(path) >= 17
 
 
 @pytest.mark.parametrize(
@@ -16,22 +17,22 @@ def test_the_one_in_use_is_new_enough():
 )
 def test_old_ones_are_passed_over(monkeypatch, versions, chosen):
     paths = {f"libLLVM-{i}.so": version for i, version in enumerate(versions)}
-    monkeypatch.setattr(llvm, "_candidates", lambda: iter(paths))
-    monkeypatch.setattr(llvm, "llvm_version", paths.get)
-    assert llvm.find_llvm() == (None if chosen is None else f"libLLVM-{chosen}.so")
+    monkeypatch.setattr(jit, "_candidates", lambda: iter(paths))
+    monkeypatch.setattr(jit, "llvm_version", paths.get)
+    assert jit.find_llvm() == (None if chosen is None else f"libLLVM-{chosen}.so")
 
 
 def test_what_is_no_library_has_no_version(tmp_path):
     path = tmp_path / "libLLVM.so"
-    assert llvm.llvm_version(str(path)) == 0
+    assert jit.llvm_version(str(path)) == 0
     path.write_text("not a library")
-    assert llvm.llvm_version(str(path)) == 0
-    assert llvm.llvm_version("libc.so.6") == 0
+    assert jit.llvm_version(str(path)) == 0
+    assert jit.llvm_version("libc.so.6") == 0
 
 
 def test_one_chosen_by_the_user_comes_first(monkeypatch):
     monkeypatch.setenv("DRJIT_LIBLLVM_PATH", "/opt/mine.so")
-    assert next(llvm._candidates()) == "/opt/mine.so"
+    assert next(jit._candidates()) == "/opt/mine.so"
 
 
 def test_without_mitsuba_the_error_says_what_to_install(monkeypatch):

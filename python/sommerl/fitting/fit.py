@@ -1,0 +1,112 @@
+"""Analytic models fitted to a material; `sommerl fit`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..brdf import Brdf
+from ..models.multi_lobe import Lobe, MultiLobe
+from .data import Samples
+from .options import FitOptions, all_models, families_of
+from .search import REFINED, Search
+
+Progress = Callable[[int, int], None]  #: steps done, steps in all
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a search started, and the error, over all samples, of what it found on a part of them."""
+
+    lobes: list[Lobe]
+    error: float
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The best fit of a model to a material.
+
+    error: what the options' loss measures. relative_error: as a share of the root of the mean square of the samples.
+    starts: all that were tried. samples: number of pairs of directions. seconds: that the search took.
+    """
+
+    model: str
+    brdf: MultiLobe
+    options: FitOptions
+    error: float
+    relative_error: float
+    starts: list[Start]
+    samples: int
+    seconds: float
+
+    def as_json(self) -> dict[str, Any]:
+        """Everything, for a file or for --json."""
+        return {
+            "model": self.model,
+            "lobes": len(self.brdf.lobes),
+            "loss": self.options.loss,
+            "error": self.error,
+            "relative_error": self.relative_error,
+            "parameters": [lobe.as_json() for lobe in self.brdf.lobes],
+            "sampling": self.options.sampling,
+            "samples": self.samples,
+            "seed": self.options.seed,
+            "conserve_energy": self.options.conserve_energy,
+            "starts": [{"parameters": [o.shape for o in s.lobes], "error": s.error} for s in self.starts],
+            "seconds": self.seconds,
+        }
+
+
+def fit(brdf: Brdf, model: str, options: FitOptions | None = None, *, progress: Progress | None = None) -> Fit:
+    """Fits one model to a material.
+
+    Raises OptionError for an unknown model, or one that cannot have so many lobes, and MaterialError for a material
+    that is black or not finite.
+    """
+    return fit_models(brdf, [model], options, progress=progress)[0]
+
+
+def fit_all(brdf: Brdf, options: FitOptions | None = None, *, progress: Progress | None = None) -> list[Fit]:
+    """Fits all models that can have so many lobes, and the diffuse ones by themselves; the best first."""
+    models = all_models((options or FitOptions()).lobes)
+    return sorted(fit_models(brdf, models, options, progress=progress), key=lambda found: found.error)
+
+
+def fit_models(
+    brdf: Brdf, models: Sequence[str], options: FitOptions | None = None, *, progress: Progress | None = None
+) -> list[Fit]:
+    """Fits several models to one set of samples, in their order. Of several, diffuse ones have one lobe.
+
+    Raises the errors of `fit`.
+    """
+    options = options or FitOptions()
+    sums = [families_of(model, options.lobes, alone=len(models) == 1) for model in models]
+    samples = Samples.of(brdf, options)
+    steps = options.starts + REFINED
+    found: list[Fit] = []
+    for model, families in zip(models, sums, strict=True):
+
+        def advance(done: int) -> None:
+            if progress:
+                progress(len(found) * steps + done, len(models) * steps)
+
+        started = time.perf_counter()
+        search = Search(families, samples, options)
+        best, ends = search.run(advance)
+        found.append(
+            Fit(
+                model,
+                MultiLobe(f"{brdf.name} ({model} fit)", search.lobes(best.places, best.albedos)),
+                options,
+                best.error,
+                best.error / search.whole.scale,
+                [Start(search.lobes(end.start, end.albedos), end.error) for end in ends],
+                len(samples.wi),
+                time.perf_counter() - started,
+            )
+        )
+    if progress:
+        progress(1, 1)
+    return found

@@ -1,0 +1,232 @@
+"""The distance between a sum of lobes and samples of a material, with its exact derivatives.
+
+Dr.Jit evaluates the lobes and differentiates them by their shapes, in one compiled pass over the samples; what is left
+is linear algebra. A lobe's albedos are linear in f_r, so for losses that are linear in f_r, too, the best albedos for
+given shapes are those of a non-negative least squares problem of the size of the number of lobes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Array, split
+from ..jit import drjit, float64
+from ..models.family import Angles, Family
+from ..optional import optional
+from .data import Samples
+from .options import Loss
+
+Matrix = NDArray[np.float64]
+
+LOG_EPSILON = 1e-3  # [1/sr]
+SMALLEST_ROOT = 1e-12  # where the cube root's slope is cut off
+UNSEEN = 1e-12  # a lobe that is that much darker than the brightest in all samples gets no light
+RANK = 1e-13  # eigenvalues below that share of the largest are rounding
+HEAVY = 1e6  # weight of an equation that is to hold exactly
+
+
+@dataclass(frozen=True)
+class Value:
+    """The squared distance, as a share of the samples' squared length, and its derivatives by albedos (lobes, 3) and by
+    the places of all shape parameters."""
+
+    distance: float
+    by_albedos: Matrix
+    by_places: NDArray[np.float64]
+
+
+class Objective:
+    """families: of the lobes. samples: what they are compared with.
+
+    Places are those of `Parameter.place`, lobe after lobe; albedos have the shape (lobes, 3).
+    """
+
+    def __init__(self, families: Sequence[Family], samples: Samples, loss: Loss) -> None:
+        self._dr: Any = drjit()
+        self._float: Any = float64()
+        self.families = families
+        self.parameters = [p for family in families for p in family.parameters]
+        self.linear = loss in ("l2", "cosine-l2")
+        self._loss = loss
+        wi, wo = (tuple(self._float(component.copy()) for component in split(w)) for w in (samples.wi, samples.wo))
+        self._angles = a = Angles(wi, wo)
+        self._dr.eval(a.cos_h, a.sin_h, a.tan2_h, a.theta_h, a.cos_d, a.along)  # once, and not with every lobe
+        self._owner = [lobe for lobe, family in enumerate(families) for _ in family.parameters]
+        self._weight = self._float(1.0) if loss == "l2" else a.cos_i
+        measured = [self._float(channel.copy()) * self._weight for channel in samples.f_r.T]
+        self._target = [self._mapped(m) for m in measured]
+        self._dr.eval(self._target)
+        targets = np.stack([t.numpy() for t in self._target])
+        self._squared = float((targets**2).sum())
+        lobes, shapes = len(families), len(self.parameters)
+        # Rows: lobes; their derivatives; samples or, if the loss is not linear, what derivatives are multiplied by.
+        self._rows = np.empty((lobes + shapes + 3, len(samples.wi)))
+        self._rows[-3:] = targets
+        for lobe, family in enumerate(families):
+            if not family.parameters:
+                self._rows[lobe] = (family.lobe(a) * self._weight).numpy()
+
+    @property
+    def count(self) -> int:
+        """How many numbers are compared."""
+        return 3 * self._rows.shape[1]
+
+    @property
+    def scale(self) -> float:
+        """The root of the mean square of the samples, as the loss sees them."""
+        return sqrt(self._squared / self.count)
+
+    def solved(self, places: NDArray[np.float64], most: float | None = None) -> tuple[Matrix, Value]:
+        """The best albedos for these shapes, none negative, each channel's sum at most `most`; and the distance.
+
+        Only for losses that are linear in f_r. The derivative by the places is the one with the albedos following,
+        since the derivative by the albedos is zero, or they are at a bound (the envelope theorem).
+        """
+        self._evaluate(places)
+        moments, lobes = self._rows @ self._rows.T, len(self.families)
+        albedos = least_squares(moments[:lobes, :lobes], moments[:lobes, -3:], most)
+        return albedos, self._linear(moments, albedos)
+
+    def value(self, places: NDArray[np.float64], albedos: Matrix) -> Value:
+        """The distance for these shapes and albedos."""
+        if self.linear:
+            self._evaluate(places)
+            return self._linear(self._rows @ self._rows.T, albedos)
+        return self._non_linear(places, albedos)
+
+    def first_albedos(self, places: NDArray[np.float64], most: float | None = None) -> Matrix:
+        """The best albedos if the loss were the straight line that touches it at the samples."""
+        self._evaluate(places)
+        lobes = len(self.families)
+        columns: list[Matrix] = []
+        for target in self._target:
+            slope = self._slope_at(target)
+            weighted = np.concatenate([self._rows[:lobes], [self._unmapped(target).numpy()]]) * slope.numpy()
+            moments = weighted @ weighted.T
+            columns.append(least_squares(moments[:lobes, :lobes], moments[:lobes, -1:], most))
+        return np.concatenate(columns, axis=1)
+
+    def error(self, places: NDArray[np.float64], albedos: Matrix) -> float:
+        """The root of the mean square of the differences, added up one by one: what the distance loses to rounding
+        where samples and model agree to more than seven digits is here."""
+        modelled = self._modelled(places, albedos)
+        differences = [self._mapped(m) - t for m, t in zip(modelled, self._target, strict=True)]
+        return sqrt(sum(float((d.numpy() ** 2).sum()) for d in differences) / self.count)
+
+    def _linear(self, moments: Matrix, albedos: Matrix) -> Value:
+        lobes, owner = len(self.families), self._owner
+        gram, data = moments[:lobes, :lobes], moments[:lobes, -3:]
+        by_albedos = 2 * (gram @ albedos - data)
+        squared = float(np.sum(albedos * (gram @ albedos)) - 2 * np.sum(albedos * data)) + self._squared
+        towards = moments[lobes:-3, :lobes] @ albedos - moments[lobes:-3, -3:]
+        by_places = 2 * np.sum(albedos[owner] * towards, axis=1)
+        return Value(max(squared, 0.0) / self._squared, by_albedos / self._squared, by_places / self._squared)
+
+    def _non_linear(self, places: NDArray[np.float64], albedos: Matrix) -> Value:
+        modelled = self._modelled(places, albedos)
+        squared = 0.0
+        differences = [self._mapped(m) - t for m, t in zip(modelled, self._target, strict=True)]
+        seeds = [d * self._slope(m) for d, m in zip(differences, modelled, strict=True)]
+        self._dr.eval(differences, seeds)
+        for channel, (difference, seed) in enumerate(zip(differences, seeds, strict=True)):
+            found = difference.numpy()
+            squared += float(found @ found)
+            self._rows[channel - 3] = seed.numpy()
+        lobes = len(self.families)
+        moments = self._rows[:-3] @ self._rows[-3:].T
+        by_places = 2 * np.sum(albedos[self._owner] * moments[lobes:], axis=1)
+        return Value(squared / self._squared, 2 * moments[:lobes] / self._squared, by_places / self._squared)
+
+    def _modelled(self, places: NDArray[np.float64], albedos: Matrix) -> list[Array]:
+        """f_r of the lobes, weighted; a channel at a time."""
+        lobes = self._evaluate(places)
+        known = [self._float(row) if lobe is None else lobe for lobe, row in zip(lobes, self._rows, strict=False)]
+        opaque = [[self._float([albedo]) for albedo in column] for column in albedos.T]
+        self._dr.make_opaque(opaque)
+        return [sum((a * s for a, s in zip(column, known, strict=True)), start=self._float(0.0)) for column in opaque]
+
+    def _evaluate(self, places: NDArray[np.float64]) -> list[Any]:
+        """Fills the rows of the lobes and of their derivatives; returns the lobes, None for those without a shape."""
+        dr = self._dr
+        found: list[Any] = []
+        derivatives: list[Any] = []
+        remaining = list(places)
+        for family in self.families:
+            mine, remaining = remaining[: len(family.parameters)], remaining[len(family.parameters) :]
+            value = None
+            for chosen in range(len(mine)):
+                at = [self._float([place]) for place in mine]
+                dr.make_opaque(at)  # the same kernel for all places
+                dr.enable_grad(at[chosen])
+                shape = [p.at(place) for p, place in zip(family.parameters, at, strict=True)]
+                lobe = family.lobe(self._angles, *shape) * self._weight
+                dr.set_grad(at[chosen], 1.0)
+                dr.forward_to(lobe)
+                derivatives.append(dr.grad(lobe))
+                value = dr.detach(lobe)
+            found.append(value)
+        dr.eval(found, derivatives)
+        for row, values in enumerate([*found, *derivatives]):
+            if values is not None:
+                self._rows[row] = values.numpy()
+        return found
+
+    def _mapped(self, f_r: Array) -> Array:
+        match self._loss:
+            case "log":
+                return self._dr.log(1.0 + f_r / LOG_EPSILON)
+            case "cube-root":
+                return self._dr.cbrt(self._dr.maximum(f_r, SMALLEST_ROOT))
+            case _:
+                return f_r
+
+    def _unmapped(self, mapped: Array) -> Array:
+        match self._loss:
+            case "log":
+                return LOG_EPSILON * (self._dr.exp(mapped) - 1.0)
+            case "cube-root":
+                return mapped * mapped * mapped
+            case _:
+                return mapped
+
+    def _slope(self, f_r: Array) -> Array:
+        """The derivative of `_mapped`."""
+        match self._loss:
+            case "log":
+                return 1.0 / (LOG_EPSILON + f_r)
+            case "cube-root":
+                root = self._mapped(f_r)
+                return self._dr.select(f_r > SMALLEST_ROOT, 1.0 / (3.0 * root * root), 0.0)
+            case _:
+                return 0.0 * f_r + 1.0
+
+    def _slope_at(self, mapped: Array) -> Array:
+        """The same, for a value that is mapped already."""
+        return self._slope(self._unmapped(mapped))
+
+
+def least_squares(gram: Matrix, data: Matrix, most: float | None) -> Matrix:
+    """x ≥ 0 (n, m) that minimises xᵀ gram x − 2 dataᵀ x column by column, Σ x ≤ `most` in each if that is given.
+
+    gram: AᵀA (n, n). data: Aᵀb (n, m).
+    """
+    nnls = optional("scipy.optimize", "SciPy", "fitting", "fit").nnls
+    length = np.sqrt(np.diag(gram))
+    seen = length > UNSEEN * length.max()
+    scale = np.divide(1.0, length, out=np.zeros_like(length), where=seen)
+    values, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
+    used = values > RANK * values[-1]
+    root = (np.sqrt(values[used]) * vectors[:, used]).T
+    right = (vectors[:, used] / np.sqrt(values[used])).T @ (data * scale[:, None])
+    found = np.stack([nnls(root, column)[0] for column in right.T], axis=1) * scale[:, None]
+    if most is not None:
+        for channel in np.flatnonzero(found.sum(axis=0) > most):
+            exact, target = np.vstack([root, HEAVY * scale]), np.append(right[:, channel], HEAVY * most)
+            found[:, channel] = nnls(exact, target)[0] * scale
+    return found

@@ -1,0 +1,191 @@
+"""The search for the shapes and albedos of a sum of lobes: sequential quadratic programming from many starts.
+
+After Ngan, Durand & Matusik 2005, "Experimental Analysis of BRDF Models", EGSR, and the paper: bounds on parameters, an
+albedo for each channel, shapes shared by the channels. Where the loss lets the best albedos for given shapes be
+solved for, only shapes are searched; docs/method.md compares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..models.family import Family
+from ..models.multi_lobe import Lobe
+from ..optional import optional
+from .data import Samples
+from .objective import Matrix, Objective
+from .options import FitOptions
+
+Vector = NDArray[np.float64]
+
+FEWER = 10  # all starts are searched from on every tenth sample,
+FEWEST = 20_000  # but on no fewer than these
+REFINED = 3  # so many of what they reach, if different, go on with all samples
+DIFFERENT = 0.02  # of the range of a parameter
+SHORT, LONG = 40, 200  # iterations
+AGAIN = 4  # searches with all samples, each in units of what the last one left: SLSQP stops at an absolute change
+WORTHWHILE = 0.99
+EDGE = 0.02  # random starts keep that share of the range away from the bounds
+SMALLEST_STEP = 1e-3  # of the largest albedo, as a unit for an albedo near 0
+
+
+@dataclass(frozen=True)
+class End:
+    """Where a search came to: places of the shape parameters, albedos (lobes, 3), and the error over all samples."""
+
+    start: Vector
+    places: Vector
+    albedos: Matrix
+    error: float
+
+
+class Search:
+    """families: of the lobes."""
+
+    def __init__(self, families: Sequence[Family], samples: Samples, options: FitOptions) -> None:
+        step = max(1, min(FEWER, len(samples.wi) // FEWEST))
+        self.whole = Objective(families, samples, options.loss)
+        self.part = self.whole if step == 1 else Objective(families, samples.every(step), options.loss)
+        self.solves = self.whole.linear  #: whether albedos are solved for, and not searched
+        self._options = options
+        self._most = 1.0 if options.conserve_energy else None
+
+    def run(self, advance: Callable[[int], None]) -> tuple[End, list[End]]:
+        """The best end, and the ends of all starts on a part of the samples."""
+        ends: list[End] = []
+        for start in self._starts():
+            places, albedos = self._descend(self.part, start, None, SHORT)
+            if self.solves:
+                albedos = self.whole.solved(places, self._most)[0]
+            ends.append(End(start, places, albedos, self.whole.error(places, albedos)))
+            advance(len(ends))
+        refined: list[End] = []
+        for end in _different(ends):
+            refined.append(self._refined(end))
+            advance(len(ends) + len(refined))
+        return min([*refined, *ends], key=lambda end: end.error), ends
+
+    def lobes(self, places: Vector, albedos: Matrix) -> list[Lobe]:
+        """As lobes of a material, the widest first."""
+        found: list[Lobe] = []
+        remaining = list(places)
+        for family, albedo in zip(self.whole.families, albedos, strict=True):
+            shape: dict[str, float] = {}
+            for p in family.parameters:
+                shape[p.name] = min(max(float(p.at(remaining.pop(0))), p.low), p.high)
+            r, g, b = map(float, albedo)
+            found.append(Lobe(family, (r, g, b), shape))
+        return sorted(found, key=lambda lobe: lobe.exponent)
+
+    def _starts(self) -> list[Vector]:
+        parameters = self.whole.parameters
+        if not parameters:
+            return [np.empty(0)]
+        random = np.random.Generator(np.random.PCG64([self._options.seed, 1]))
+        first = np.array([p.place(p.start) for p in parameters])
+        others = EDGE + (1 - 2 * EDGE) * random.random((self._options.starts - 1, len(parameters)))
+        return [first, *others]
+
+    def _refined(self, end: End) -> End:
+        places, albedos = end.places, end.albedos
+        distance = self.whole.value(places, albedos).distance
+        for _ in range(AGAIN):
+            before = distance
+            places, albedos = self._descend(self.whole, places, albedos, LONG)
+            distance = self.whole.value(places, albedos).distance
+            if distance > WORTHWHILE * before:
+                break
+        return End(end.start, places, albedos, self.whole.error(places, albedos))
+
+    def _descend(
+        self, objective: Objective, places: Vector, albedos: Matrix | None, iterations: int
+    ) -> tuple[Vector, Matrix]:
+        """From one place to the nearest minimum."""
+        if self.solves:
+            return self._descend_shapes(objective, places, iterations)
+        if albedos is None:
+            albedos = objective.first_albedos(places, self._most)
+        return self._descend_all(objective, places, albedos, iterations)
+
+    def _descend_shapes(self, objective: Objective, places: Vector, iterations: int) -> tuple[Vector, Matrix]:
+        """Over the shapes; the albedos follow."""
+        unit = objective.solved(places, self._most)[1].distance or 1.0
+
+        def value(x: Vector) -> tuple[float, Vector]:
+            found = objective.solved(x, self._most)[1]
+            return found.distance / unit, found.by_places / unit
+
+        if len(places):
+            places = _slsqp(value, places, [(0.0, 1.0)] * len(places), iterations)
+        return places, objective.solved(places, self._most)[0]
+
+    def _descend_all(
+        self, objective: Objective, places: Vector, albedos: Matrix, iterations: int
+    ) -> tuple[Vector, Matrix]:
+        """Over shapes and albedos."""
+        count, shape = len(places), albedos.shape
+        unit = objective.value(places, albedos).distance or 1.0
+        size = np.maximum(albedos, SMALLEST_STEP * (albedos.max() or 1.0))
+
+        def value(x: Vector) -> tuple[float, Vector]:
+            found = objective.value(x[:count], x[count:].reshape(shape) * size)
+            return found.distance / unit, np.append(found.by_places, found.by_albedos * size) / unit
+
+        sums: list[Vector] = []  # of albedos, one a channel, none above 1
+        for channel in range(3 if self._most else 0):
+            row = np.zeros(shape)
+            row[:, channel] = size[:, channel]
+            sums.append(np.append(np.zeros(count), row))
+        bounds: list[tuple[float, float | None]] = [*[(0.0, 1.0)] * count, *[(0.0, None)] * albedos.size]
+        x = _slsqp(value, np.append(places, albedos / size), bounds, iterations, sums)
+        return x[:count], x[count:].reshape(shape) * size
+
+
+def _slsqp(
+    value: Callable[[Vector], tuple[float, Vector]],
+    start: Vector,
+    bounds: Sequence[tuple[float, float | None]],
+    iterations: int,
+    sums: Sequence[Vector] = (),
+) -> Vector:
+    """SciPy's SLSQP (Kraft 1988), to the end of its digits; of what it looked at, the best that is allowed.
+
+    value: what is minimised, and its derivative. sums: vectors whose products with x are 1 at most.
+    """
+    lowest, best = np.inf, start
+
+    def watched(x: Vector) -> tuple[float, Vector]:
+        nonlocal lowest, best
+        found, slope = value(x)
+        if found < lowest and all(row @ x <= 1 + 1e-9 for row in sums):
+            lowest, best = found, x.copy()
+        return found, slope
+
+    constraints: list[dict[str, Any]] = []
+    if sums:
+        rows = np.stack(sums)
+        constraints.append({"type": "ineq", "fun": lambda x: 1 - rows @ x, "jac": lambda x: -rows})  # pyright: ignore
+    optional("scipy.optimize", "SciPy", "fitting", "fit").minimize(
+        watched,
+        start,
+        jac=True,
+        method="SLSQP",
+        bounds=bounds,
+        constraints=constraints,
+        options={"ftol": 1e-15, "maxiter": iterations},
+    )
+    return best
+
+
+def _different(ends: Sequence[End]) -> list[End]:
+    """The REFINED best, of which no two are at one place."""
+    chosen: list[End] = []
+    for end in sorted(ends, key=lambda end: end.error):
+        if all(np.abs(end.places - other.places).max(initial=0) > DIFFERENT for other in chosen):
+            chosen.append(end)
+    return chosen[:REFINED]

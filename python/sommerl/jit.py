@@ -1,0 +1,100 @@
+"""Dr.Jit with an LLVM that works.
+
+Dr.Jit needs libLLVM 17 or newer. Given an older one, which is what many systems install, it either stays inactive or
+aborts the process on its first minimum or maximum; so it is never left to find one by itself.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import ctypes.util
+import importlib
+import importlib.metadata
+import importlib.util
+import os
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from .errors import MissingDependencyError
+
+OLDEST_LLVM = 17
+PATH_VARIABLE = "DRJIT_LIBLLVM_PATH"
+
+
+def drjit() -> Any:
+    """The module `drjit`. Raises MissingDependencyError if it is not installed."""
+    if importlib.util.find_spec("drjit") is None:
+        raise MissingDependencyError("fitting needs Dr.Jit: install sommerl[fit]")
+    choose_llvm()
+    return importlib.import_module("drjit")
+
+
+def float64() -> Any:
+    """Dr.Jit's type of arrays of double precision that can be differentiated.
+
+    Raises MissingDependencyError if there is no LLVM to compile for the processor.
+    """
+    dr = drjit()
+    if not has_llvm(dr):
+        raise MissingDependencyError(
+            f"fitting: expected a libLLVM {OLDEST_LLVM} or newer, found none; on Linux, install sommerl[fit], or set "
+            f"{PATH_VARIABLE}"
+        )
+    return importlib.import_module("drjit.llvm.ad").Float64
+
+
+def has_llvm(dr: Any) -> bool:
+    """Whether Dr.Jit found an LLVM, and a recent one."""
+    return dr.has_backend(dr.JitBackend.LLVM) and dr.detail.llvm_version()[0] >= OLDEST_LLVM
+
+
+def choose_llvm() -> None:
+    """Tells Dr.Jit, if not imported yet, which libLLVM to load: none rather than one that it would find by itself."""
+    if "drjit" not in sys.modules:
+        os.environ[PATH_VARIABLE] = find_llvm() or os.devnull
+
+
+def find_llvm() -> str | None:
+    """The path of a libLLVM that Dr.Jit can use, or None."""
+    return next((path for path in _candidates() if llvm_version(path) >= OLDEST_LLVM), None)
+
+
+def llvm_version(path: str) -> int:
+    """The major version that a libLLVM reports of itself; 0 if it cannot be loaded or does not say."""
+    try:
+        library = ctypes.CDLL(path)
+        major, minor, patch = (ctypes.c_uint() for _ in range(3))
+        library.LLVMGetVersion(ctypes.byref(major), ctypes.byref(minor), ctypes.byref(patch))
+        return major.value
+    except (OSError, AttributeError):
+        # LLVMGetVersion came with LLVM 16: what lacks it is older.
+        return 0
+
+
+def _candidates() -> Iterator[str]:
+    if chosen := os.environ.get(PATH_VARIABLE):
+        yield chosen
+    yield from _in_wheel()
+    yield from _in_system()
+    if found := ctypes.util.find_library("LLVM"):
+        yield found
+
+
+def _in_wheel() -> Iterator[str]:
+    try:
+        files = importlib.metadata.files("karellen-llvm-core") or []
+    except importlib.metadata.PackageNotFoundError:
+        return
+    for file in files:
+        if re.fullmatch(r"libLLVM\.so|libLLVM\.dylib|LLVM-C\.dll", file.name):
+            yield str(Path(str(file.locate())).resolve())
+
+
+def _in_system() -> Iterator[str]:
+    places = [Path(p) for p in ("/usr/lib", "/usr/lib64", "/usr/local/lib", "/opt/homebrew/opt/llvm/lib")]
+    patterns = ("libLLVM*.so*", "*/libLLVM*.so*", "llvm-*/lib/libLLVM*.so*", "libLLVM*.dylib")
+    found = {str(path) for place in places for pattern in patterns for path in place.glob(pattern)}
+    yield from sorted(found, key=lambda path: [int(n) for n in re.findall(r"\d+", Path(path).name)], reverse=True)

@@ -1,0 +1,34 @@
+"""Cook & Torrance 1982, "A Reflectance Model for Computer Graphics", ACM Transactions on Graphics 1(1).
+
+With Schlick's approximation of F, as in the fits of Ngan, Durand & Matusik 2005, "Experimental Analysis of BRDF
+Models", EGSR, and with 4 in place of the printed π in the denominator, which is what the facets' density asks for
+(Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces", EGSR).
+"""
+
+from __future__ import annotations
+
+from ..arrays import Array, ops
+from .family import PI, Angles, Family, exponent_of_width
+from .microfacets import F0, SLOPE, fresnel, grooves
+
+
+def beckmann(a: Angles, m: Array) -> Array:
+    """D [1/sr] = exp(−tan² θ_h / m²) / (π m² cos⁴ θ_h)."""
+    m2, cos2 = m * m, a.cos_h * a.cos_h
+    return ops(a.cos_i).exp(-a.tan2_h / m2) / (PI * m2 * cos2 * cos2)
+
+
+def lobe(a: Angles, m: Array, f0: Array) -> Array:
+    """f_r [1/sr] = D F G / (4 cos θ_i cos θ_o)."""
+    return beckmann(a, m) * fresnel(a.cos_d, f0) * grooves(a) / (4.0 * a.cos_i * a.cos_o)
+
+
+COOK_TORRANCE = Family(
+    name="cook-torrance",
+    title="Cook-Torrance",
+    source="Cook & Torrance 1982, A Reflectance Model for Computer Graphics, ACM Transactions on Graphics 1(1)",
+    parameters=(SLOPE, F0),
+    lobe=lobe,
+    conserves_energy=True,
+    exponent=exponent_of_width,
+)

@@ -1,0 +1,121 @@
+"""A sum of lobes with an albedo for each channel: analytic models as they are fitted and compared.
+
+Ngan, Durand & Matusik 2005, "Experimental Analysis of BRDF Models", EGSR: a Lambertian base under one or more specular
+lobes; albedos differ between channels, shapes do not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Triple, ops
+from ..brdf import Brdf, Buffers
+from ..errors import MaterialError
+from .ashikhmin_shirley import ASHIKHMIN_SHIRLEY
+from .blinn_phong import BLINN_PHONG
+from .cook_torrance import COOK_TORRANCE
+from .family import Angles, Family
+from .ggx import GGX
+from .lafortune import LAFORTUNE
+from .lambertian import LAMBERTIAN
+from .oren_nayar import OREN_NAYAR
+from .phong import PHONG
+from .torrance_sparrow import TORRANCE_SPARROW
+from .ward import WARD
+from .ward_duer import WARD_DUER
+
+FAMILIES: dict[str, Family] = {
+    family.name: family
+    for family in (
+        LAMBERTIAN,
+        OREN_NAYAR,
+        PHONG,
+        BLINN_PHONG,
+        WARD,
+        WARD_DUER,
+        LAFORTUNE,
+        COOK_TORRANCE,
+        TORRANCE_SPARROW,
+        ASHIKHMIN_SHIRLEY,
+        GGX,
+    )
+}
+
+
+@dataclass(frozen=True)
+class Lobe:
+    """One lobe: a family's formula times an albedo (r, g, b).
+
+    shape: a number for each of the family's parameters. Raises MaterialError for other names, and for numbers that are
+    negative albedos, out of the parameter's bounds or not finite.
+    """
+
+    family: Family
+    albedo: tuple[float, float, float]
+    shape: Mapping[str, float]
+
+    def __post_init__(self) -> None:
+        name, bounds = self.family.name, {p.name: p for p in self.family.parameters}
+        if set(self.shape) != set(bounds):
+            raise MaterialError(f"{name}: expected parameters {sorted(bounds)}, found {sorted(self.shape)}")
+        for key, value in self.shape.items():
+            if not bounds[key].low <= value <= bounds[key].high:
+                raise MaterialError(
+                    f"{name}: {key}: expected {bounds[key].low:g} to {bounds[key].high:g}, found {value:g}"
+                )
+        if len(self.albedo) != 3 or not all(isfinite(value) and value >= 0 for value in self.albedo):
+            raise MaterialError(f"{name}: albedo: expected three numbers of at least 0, found {self.albedo}")
+
+    def as_json(self) -> dict[str, Any]:
+        return {"family": self.family.name, "albedo": list(self.albedo), **self.shape}
+
+    def __str__(self) -> str:
+        numbers = [f"albedo {' '.join(f'{value:.4g}' for value in self.albedo)}"]
+        numbers += [f"{key} {value:.4g}" for key, value in self.shape.items()]
+        return f"{self.family.name}: {', '.join(numbers)}"
+
+    @property
+    def exponent(self) -> float:
+        """How narrow it is: of Blinn-Phong's lobe with half vectors as narrow; 0 of a diffuse lobe."""
+        return self.family.exponent(*self.values) if self.family.exponent else 0.0
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The shape, in the order of the family's parameters."""
+        return tuple(self.shape[p.name] for p in self.family.parameters)
+
+
+class MultiLobe(Brdf):
+    """f_r = Σ albedo · lobe. Raises MaterialError if there is no lobe."""
+
+    def __init__(self, name: str, lobes: Sequence[Lobe]) -> None:
+        if not lobes:
+            raise MaterialError(f"{name}: expected one lobe or more, found none")
+        self.name = name
+        self.lobes = tuple(lobes)
+
+    @property
+    def reciprocal(self) -> bool:
+        return all(lobe.family.reciprocal for lobe in self.lobes)
+
+    def buffers(self) -> dict[str, NDArray[Any]]:
+        # In a buffer, and not in the formula, so that materials of the same families share one compiled kernel.
+        return {"parameters": np.array([x for lobe in self.lobes for x in (*lobe.albedo, *lobe.values)])}
+
+    def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
+        angles, parameters, gather = Angles(wi, wo), buffers["parameters"], ops(wi[0]).gather
+        total, start = [0.0, 0.0, 0.0], 0
+        for lobe in self.lobes:
+            count = 3 + len(lobe.family.parameters)
+            found = [gather(parameters, start + k) for k in range(count)]
+            start += count
+            value = lobe.family.lobe(angles, *found[3:])
+            total = [sum_ + albedo * value for sum_, albedo in zip(total, found[:3], strict=True)]
+        r, g, b = total
+        return r, g, b

@@ -1,0 +1,71 @@
+"""The command `paper`: the paper's tables and figures, written to a folder and shown."""
+
+from __future__ import annotations
+
+import csv
+import io
+from argparse import Namespace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from .. import console
+from ..errors import FormatError
+from ..files import atomic_write, check_writable
+from ..fitting import FitOptions
+from . import fits
+
+Rows = Sequence[fits.FitRow] | Sequence[fits.ImageRow]
+
+
+def _table1(data: Path | None, options: FitOptions, picture: Path, progress: fits.Progress | None) -> Rows:
+    return fits.table1(data, options, progress=progress)
+
+
+def _figure5(data: Path | None, options: FitOptions, picture: Path, progress: fits.Progress | None) -> Rows:
+    return fits.figure5(data, picture, options, progress=progress)
+
+
+def _figure6(data: Path | None, options: FitOptions, picture: Path, progress: fits.Progress | None) -> Rows:
+    return fits.figure6(data, picture, options, progress=progress)
+
+
+ITEMS: dict[str, tuple[str, Callable[[Path | None, FitOptions, Path, fits.Progress | None], Rows]]] = {
+    "table1": ("Table 1: errors of two-lobe fits", _table1),
+    "fig5": ("Fig. 5: blue-metallic-paint on a sphere", _figure5),
+    "fig6": ("Fig. 6: errors of three-lobe fits to green-metallic-paint", _figure6),
+}
+
+
+def paper(options: Namespace) -> dict[str, Any]:
+    """Makes the items asked for. Raises FormatError if there is no such data."""
+    if options.data and not options.data.exists():
+        raise FormatError(f"{options.data}: expected a folder or an archive of materials, found none")
+    options.out.mkdir(parents=True, exist_ok=True)
+    chosen = FitOptions(samples=options.samples, seed=options.seed)
+    result: dict[str, Any] = {}
+    for item in ITEMS if options.item == "all" else [options.item]:
+        title, make = ITEMS[item]
+        target, picture = options.out / f"{item}.csv", options.out / f"{item}.png"
+        for path in (target, picture):
+            check_writable(path)
+        with console.progress(title) as advance:
+            rows = [asdict(row) for row in make(options.data, chosen, picture, advance)]
+        _write(target, rows)
+        result[item] = rows
+        if not options.json:
+            shown = [
+                [f"{value:.5g}" if isinstance(value, float) else str(value) for value in row.values()] for row in rows
+            ]
+            console.print_table(f"{title} → {target}", list(rows[0]), shown)
+    return result
+
+
+def _write(path: Path, rows: Sequence[dict[str, Any]]) -> None:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    with atomic_write(path) as out:
+        out.write(text.getvalue().encode())

@@ -1,0 +1,142 @@
+"""The commands `fit` and `paper`."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from helpers import must_fail
+from test_cli import run, run_json
+
+from sommerl import NAMES, BrdfTable, builtin
+from sommerl.formats import merl
+from sommerl.models.multi_lobe import FAMILIES
+from sommerl.paper.data import expected, material
+
+QUICK = ["--samples", "2000", "--starts", "3"]
+
+
+def test_fit_and_what_it_writes(capsys, tmp_path):
+    output, picture = tmp_path / "fits.json", tmp_path / "fits.png"
+    arguments = ["red-fabric", *QUICK, "--model", "ward", "--lobes", "3", "-o", output, "--picture", picture]
+    result = run_json(capsys, "fit", *arguments)
+    (fit,) = result["fits"]
+    assert fit.keys() >= {"model", "lobes", "loss", "error", "parameters", "starts", "seconds", "psnr_object_db"}
+    assert (fit["model"], fit["lobes"], fit["loss"], fit["samples"]) == ("ward", 3, "cosine-l2", 2000)
+    assert [lobe["family"] for lobe in fit["parameters"]] == ["lambertian", "ward", "ward"]
+    assert json.loads(output.read_text()) == result
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    # The file is a material for the other commands.
+    info = run_json(capsys, "info", output)
+    assert (info["kind"], info["name"]) == ("model", "red-fabric (SGD stand-in) (ward fit)")
+    assert info["lobes"] == fit["parameters"]
+    small = ["--size", "24", "--spp", "4"]
+    compared = run_json(capsys, "compare", "red-fabric", f"{output}:ward", *small)
+    assert compared["psnr_object_db"] > 20
+
+
+def test_all_models_in_a_table(capsys):
+    status, out, err = run(capsys, "fit", "red-fabric", *QUICK)
+    assert (status, err) == (0, "")
+    for name in FAMILIES:
+        assert name in out
+    errors = [each["error"] for each in run_json(capsys, "fit", "red-fabric", *QUICK)["fits"]]
+    assert errors == sorted(errors)
+    assert len(errors) == len(FAMILIES)
+
+
+def test_a_table_and_a_compressed_one(capsys, tmp_path):
+    table, compact = tmp_path / "red.binary", tmp_path / "red.smrl"
+    merl.write(BrdfTable.sample(builtin("red-fabric")), table)
+    run_json(capsys, "compress", table, "-o", compact, "--clusters", "64", "--epochs", "1")
+    found = [
+        run_json(capsys, "fit", path, *QUICK, "--model", "ggx")["fits"][0]["parameters"][1]["alpha"]
+        for path in ("red-fabric", table, compact)
+    ]
+    assert found[1:] == pytest.approx([found[0]] * 2, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        (["red-fabric", "--model", "wardd"], 2, "error: model: expected lambertian, oren-nayar, phong"),
+        (["red-fabric", "--lobes", "9"], 2, "error: lobes: expected 1 to 4, found 9"),
+        (["red-fabric", "--model", "ward", "--lobes", "1"], 2, "error: lobes: expected 2 to 4 of ward"),
+        (["red-fabric", "--loss", "l1"], 2, "error: argument --loss: invalid choice: 'l1'"),
+        (["red-fabric", "-o", "x.txt"], 2, "error: x.txt: expected a name that ends in .json"),
+        (["red-fabric", "--picture", "x.jpg"], 2, "error: x.jpg: expected a name that ends in .png"),
+        (["red-fabrik"], 1, "error: red-fabrik: expected a file or a built-in material"),
+        (["nowhere.binary"], 1, "error: nowhere.binary: expected a file, found none"),
+    ],
+)
+def test_bad_options(capsys, arguments, status, message):
+    found, out, err = run(capsys, "fit", *arguments)
+    assert (found, out) == (status, "")
+    assert err.startswith(message)
+    assert err.count("\n") == 1
+
+
+def test_black_and_undefined_tables(capsys, tmp_path):
+    for value in (0.0, np.nan):
+        path = tmp_path / "x.binary"
+        path.write_bytes(np.array([90, 90, 180], "<i4").tobytes() + np.full(3 * 1_458_000, value, "<f8").tobytes())
+        status, out, err = run(capsys, "fit", path)
+        assert (status, out) == (1, "")
+        assert err == f"error: {path}: expected a positive, finite reflectance above the horizon, found none\n"
+
+
+def check_rows(rows, printed):
+    """One a figure of the paper, with that figure."""
+    assert {(row["material"], row["model"]): [row["paper"], row["paper_som_man"]] for row in rows} == {
+        (name, model): figures for name, values in printed.items() for model, figures in values.items()
+    }
+    for row in rows:
+        assert 0 < row["error"] < 1
+        assert row["error_som_man"] == pytest.approx(row["error"], rel=0.1)
+
+
+def test_table_1(capsys, tmp_path):
+    result = run_json(capsys, "paper", "table1", "-o", tmp_path, "--samples", "1000")
+    check_rows(result["table1"], expected("table1"))
+    must_fail(check_rows, result["table1"], {"nickel": {}})
+    with (tmp_path / "table1.csv").open() as stream:
+        written = list(csv.DictReader(stream))
+    assert [float(row["error"]) for row in written] == [row["error"] for row in result["table1"]]
+
+
+def test_figure_6(capsys, tmp_path):
+    result = run_json(capsys, "paper", "fig6", "-o", tmp_path, "--samples", "1000")
+    check_rows(result["fig6"], {"green-metallic-paint": expected("fig6")})
+    assert (tmp_path / "fig6.png").read_bytes().startswith(b"\x89PNG")
+
+
+def check_ten_decibels(rows):
+    """The goal: the compressed table is at least that much nearer than the best two-lobe model."""
+    first, *models = rows
+    assert first["model"] == "som-man"
+    assert first["psnr_object_db"] >= max(row["psnr_object_db"] for row in models) + 10
+
+
+def test_figure_5(capsys, tmp_path):
+    rows = run_json(capsys, "paper", "fig5", "-o", tmp_path, "--samples", "20000")["fig5"]
+    check_ten_decibels(rows)
+    must_fail(check_ten_decibels, [rows[0] | {"psnr_object_db": rows[1]["psnr_object_db"] + 5}, *rows[1:]])
+    assert (tmp_path / "fig5.png").read_bytes().startswith(b"\x89PNG")
+    with (tmp_path / "fig5.csv").open() as stream:
+        assert [float(row["paper_db"]) for row in csv.DictReader(stream)] == list(expected("fig5").values())
+
+
+def test_data_of_ones_own(capsys, tmp_path):
+    for name in ("purple-paint", "x"):
+        merl.write(BrdfTable.sample(builtin("red-fabric")), tmp_path / f"{name}.binary")
+    assert material(tmp_path, "purple-paint").name == "purple-paint"
+    assert material(None, "purple-paint").name.startswith("purple-paint")
+    assert set(expected("table1")) <= set(NAMES)
+    for data, message in (
+        (tmp_path / "none", f"error: {tmp_path / 'none'}: expected a folder or an archive of materials, found none\n"),
+        (tmp_path, f"error: {tmp_path}: expected a file blue-metallic-paint with one of .smrl, "),
+    ):
+        status, _, err = run(capsys, "paper", "fig5", "--data", data, "-o", tmp_path)
+        assert status == 1
+        assert err.startswith(message)
+        assert err.count("\n") == 1
