@@ -37,6 +37,17 @@ ITEMS: dict[str, tuple[str, Callable[[Path | None, FitOptions, Path, fits.Progre
     "fig6": ("Fig. 6: errors of three-lobe fits to green-metallic-paint", _figure6),
 }
 
+HEADINGS = {
+    "model": "model",
+    "error": "table",
+    "error_som_man": "M = 1000",
+    "paper": "paper: table",
+    "paper_som_man": "paper: ours",
+    "psnr_frame_db": "PSNR, frame",
+    "psnr_object_db": "PSNR, object",
+    "paper_db": "paper",
+}
+
 
 def paper(options: Namespace) -> dict[str, Any]:
     """Makes the items asked for. Raises FormatError if there is no such data."""
@@ -55,11 +66,21 @@ def paper(options: Namespace) -> dict[str, Any]:
         _write(target, rows)
         result[item] = rows
         if not options.json:
-            shown = [
-                [f"{value:.5g}" if isinstance(value, float) else str(value) for value in row.values()] for row in rows
-            ]
-            console.print_table(f"{title} → {target}", list(rows[0]), shown)
+            _show(title, rows)
+            print(f"→ {target}\n")
     return result
+
+
+def _show(title: str, rows: Sequence[dict[str, Any]]) -> None:
+    """On standard output, a table for each material."""
+    for material in dict.fromkeys(row.get("material") for row in rows):
+        shown: list[list[str]] = []
+        for row in rows:
+            if row.get("material") == material:
+                found = [value for key, value in row.items() if key != "material"]
+                shown.append([f"{value:.5g}" if isinstance(value, float) else str(value) for value in found])
+        columns = [HEADINGS[key] for key in rows[0] if key != "material"]
+        console.print_table(f"{title}, {material}" if material else title, columns, shown)
 
 
 def _write(path: Path, rows: Sequence[dict[str, Any]]) -> None:
