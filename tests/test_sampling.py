@@ -4,6 +4,7 @@ from helpers import lambertian_table, must_fail, random_directions
 
 from sommerl import NAMES, builtin
 from sommerl.arrays import split
+from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
 from sommerl.sampling import BlinnPhongSampler
 
 ANGLES = (0, 45, 80)
@@ -78,6 +79,23 @@ def check_albedo(brdf, sampler, wo):
 def test_mean_weight_is_the_albedo(name, degrees):
     brdf = builtin(name)
     check_albedo(brdf, BlinnPhongSampler.fitted(brdf), viewer(degrees))
+
+
+@pytest.mark.parametrize("name", [name for name, family in FAMILIES.items() if family.exponent])
+def test_directions_for_a_model_by_the_exponent_that_it_names(name):
+    lobe = Lobe(FAMILIES[name], (0.5, 0.5, 0.5), {p.name: p.start for p in FAMILIES[name].parameters})
+    sampler = BlinnPhongSampler(lobe.exponent, 0.7)
+    for degrees in ANGLES:
+        check_density(sampler, viewer(degrees))
+    check_albedo(MultiLobe(name, [lobe]), sampler, viewer(45))
+    must_fail(check_albedo, Doubled(name, [lobe]), sampler, viewer(45))
+
+
+class Doubled(MultiLobe):
+    """Broken on purpose: brighter for the many directions of a quadrature than for those of a sampler."""
+
+    def eval(self, wi, wo):
+        return super().eval(wi, wo) * (1.1 if len(wi) > 1_000_000 else 1)
 
 
 def test_that_check_notices_a_brighter_material():
