@@ -35,6 +35,16 @@ def test_fit_and_what_it_writes(capsys, tmp_path):
     assert compared["psnr_object_db"] > 20
 
 
+def test_fit_does_not_write_over_its_input(capsys, tmp_path):
+    path = tmp_path / "fits.json"
+    run_json(capsys, "fit", "red-fabric", *QUICK, "--model", "ward", "-o", path)
+    before = path.read_text()
+    for source in (path, f"{path}:ward"):
+        status, _, err = run(capsys, "fit", source, *QUICK, "-o", path)
+        assert (status, err) == (2, f"error: {path}: expected an output other than the input\n")
+        assert path.read_text() == before
+
+
 def test_all_models_in_a_table(capsys):
     status, out, err = run(capsys, "fit", "red-fabric", *QUICK)
     assert (status, err) == (0, "")

@@ -269,7 +269,9 @@ def _fit(add: Any) -> None:
         default = getattr(FIT_DEFAULTS, name)
         command.add_argument(f"--{name}", type=int, default=default, metavar="N", help=f"{text} (%(default)s)")
     command.add_argument(
-        "--conserve-energy", action="store_true", help="let the albedos of each channel sum to 1 at most"
+        "--conserve-energy",
+        action="store_true",
+        help="let the albedos of each channel sum to 1 at most (which binds oren-nayar, ward and ward-duer loosely)",
     )
     command.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help="a .json with everything; FILE.json:MODEL is a material"

@@ -26,8 +26,9 @@ from .describe import (
 )
 from .errors import FormatError, MaterialError, MissingDependencyError, OptionError, SommerlError
 from .files import check_writable
-from .fitting.fit import fit_models
-from .fitting.options import FitOptions, all_models, families_of
+from .fitting.fit import fit as fit_model
+from .fitting.fit import fit_all
+from .fitting.options import FitOptions, families_of
 from .formats import fits
 from .formats.names import split_member
 from .load import EXTENSIONS, interpolated, load, load_table
@@ -198,11 +199,16 @@ def fit(options: Namespace) -> dict[str, Any]:
         if path:
             check_output(path, (extension,), options.material)
     chosen = FitOptions(**{field.name: getattr(options, field.name) for field in fields(FitOptions)})
-    models = [options.model] if options.model != "all" else all_models(chosen.lobes)
-    families_of(models[0], chosen.lobes, alone=len(models) == 1)  # an unknown one is better told before reading
+    every = options.model == "all"
+    if not every:
+        families_of(options.model, chosen.lobes)  # an unknown one is better told before reading
     brdf = load(options.material)
     with console.progress(f"fitting {brdf.name}") as advance:
-        found = sorted(fit_models(brdf, models, chosen, progress=advance), key=lambda fit: fit.error)
+        found = (
+            fit_all(brdf, chosen, progress=advance)
+            if every
+            else [fit_model(brdf, options.model, chosen, progress=advance)]
+        )
     result = fits.content(brdf.name, [each.as_json() for each in found])
     if options.picture:
         with console.progress("rendering") as advance:
@@ -268,7 +274,8 @@ def check_output(path: Path, extensions: tuple[str, ...], source: str = "") -> N
     """Says before long work what would go wrong after it."""
     if path.suffix.lower() not in extensions:
         raise OptionError(f"{path}: expected a name that ends in {' or '.join(extensions)}, found {path.suffix!r}")
-    if source and path.exists() and Path(source).exists() and path.samefile(source):
+    file = split_member(source)[0]
+    if source and path.exists() and file.exists() and path.samefile(file):
         raise OptionError(f"{path}: expected an output other than the input")
     check_writable(path)
 

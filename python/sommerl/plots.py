@@ -37,7 +37,8 @@ def coverage(table: ScatteredTable, path: Path) -> None:
 
 
 def fits(name: str, models: Sequence[str], comparisons: Sequence[Comparison], path: Path) -> None:
-    """Writes a PNG: a material on a sphere, its fits, and below each what differs, eight times enlarged.
+    """Writes a PNG: a material on a sphere, its fits with their PSNR over the object, and below each the differences,
+    eight times enlarged.
 
     comparisons: of `compare_on_sphere`, one a model. Raises MissingDependencyError without matplotlib.
     """

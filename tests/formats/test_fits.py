@@ -43,23 +43,31 @@ def test_a_fit_is_read_as_the_material_that_it_is(path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"sommerl_fits": 2}, "sommerl_fits: expected 1, found 2"),
+        ({"sommerl_fits": 2}, 'expected fits as `sommerl fit` writes them, with "sommerl_fits": 1, found 2'),
+        ({"sommerl_fits": True}, 'expected fits as `sommerl fit` writes them, with "sommerl_fits": 1, found True'),
+        ({"material": 1}, "material: expected a name of at most 200 characters, found something else"),
+        ({"material": "x" * 201}, "material: expected a name of at most 200 characters, found something else"),
         ({"fits": []}, "fits: expected one or more, found none"),
         ({"fits": 1}, "fits: expected a list of at most 100, found something else"),
         ({"fits": [1]}, "fits: expected a JSON object, found int"),
+        ({"fits": [{}]}, "model: expected a name of at most 200 characters, found something else"),
         ({"fits": [{"model": "x"}]}, "parameters: expected a list of at most 100, found something else"),
-        ({"fits": [{"parameters": []}]}, "None): expected one lobe or more, found none"),
-        ({"fits": [{"parameters": [{"family": "ward"}]}]}, "albedo: expected a list of at most 100, found something"),
-        ({"fits": [{"parameters": [{"family": ["ward"]}]}]}, "parameters: expected a family of lambertian, "),
+        ({"fits": [{"model": "x", "parameters": []}]}, "paint (x fit): expected one lobe or more, found none"),
+        (
+            {"fits": [{"model": "x", "parameters": [{"family": "ward"}]}]},
+            "albedo: expected a list of at most 100, found",
+        ),
+        (
+            {"fits": [{"model": "x", "parameters": [{"family": ["ward"]}]}]},
+            "parameters: expected a family of lambertian",
+        ),
     ],
 )
 def test_other_content(path, change, message):
     path.write_text(json.dumps(json.loads(path.read_text()) | change))
     with pytest.raises(FormatError) as caught:
         load(path)
-    assert str(caught.value).startswith(f"{path}: ")
-    if "None)" not in message:
-        assert message in str(caught.value)
+    assert str(caught.value).startswith(f"{path}: {message}")
 
 
 @pytest.mark.parametrize(
@@ -69,7 +77,11 @@ def test_other_content(path, change, message):
         ({"family": "ward", "albedo": [0, 0, 0], "alpha": 7}, "ward: alpha: expected 0.004 to 1, found 7"),
         ({"family": "ward", "albedo": [0, 0, 0], "alpha": float("nan")}, "ward: alpha: expected 0.004 to 1, found nan"),
         ({"family": "ward", "albedo": [0, 0, 0], "alpha": "x"}, "ward: expected numbers, found something else"),
-        ({"family": "ward", "albedo": [0, 0], "alpha": 1}, "ward: albedo: expected three numbers of at least 0, found"),
+        ({"family": "ward", "albedo": [10**400, 0, 0], "alpha": 1}, "ward: expected numbers, found something else"),
+        ({"family": "ward", "albedo": [0, 0, 0], "alpha": 10**400}, "ward: expected numbers, found something else"),
+        ({"family": "ward", "albedo": [0, 0, 0], "x" * 201: 1}, "ward: expected a name of at most 200 characters"),
+        ({"family": "ward", "albedo": [1e31, 0, 0], "alpha": 1}, "ward: albedo: expected three numbers of at least 0"),
+        ({"family": "ward", "albedo": [0, 0], "alpha": 1}, "ward: albedo: expected three numbers of at least 0"),
         ({"family": "ward", "albedo": [0, -1, 0], "alpha": 1}, "ward: albedo: expected three numbers of at least 0"),
     ],
 )
@@ -78,6 +90,22 @@ def test_other_lobes(path, lobe, message):
     with pytest.raises(FormatError, match="^" + str(path)) as caught:
         load(path)
     assert message in str(caught.value)
+
+
+def test_another_json_file(tmp_path):
+    path = tmp_path / "snippet.json"
+    path.write_text('{"type": "sommerl"}')
+    assert complaint(load, path) == (
+        f'{path}: expected fits as `sommerl fit` writes them, with "sommerl_fits": 1, found another JSON file'
+    )
+
+
+def test_names_are_made_visible(path):
+    changed = json.loads(path.read_text()) | {"material": "\x1b[31mred"}
+    changed["fits"][1]["model"] = "\x1bx"
+    path.write_text(json.dumps(changed))
+    assert load(path).name == "�[31mred (cook-torrance fit)"
+    assert "\x1b" not in complaint(load, f"{path}:\x1bnone")
 
 
 def test_members(path):

@@ -9,7 +9,7 @@ from helpers import must_fail
 from lobes import FAMILY_LIST, evaluated, label, pairs, scaled
 
 from sommerl.models.lafortune import LAFORTUNE
-from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
+from sommerl.models.multi_lobe import FAMILIES
 from sommerl.models.phong import PHONG
 
 WI, WO = pairs()
@@ -93,16 +93,6 @@ def over_the_cosine(family):
 def test_light_and_viewer_may_be_swapped(family, shape):
     check_reciprocal(family, shape)
     must_fail(check_reciprocal, over_the_cosine(family), shape)
-
-
-def test_a_sum_is_reciprocal_if_all_lobes_are():
-    def check(family):
-        assert MultiLobe(
-            "x", [Lobe(FAMILIES["lambertian"], (1, 1, 1), {}), Lobe(family, (1, 1, 1), {"n": 30})]
-        ).reciprocal
-
-    check(PHONG)
-    must_fail(check, replace(over_the_cosine(PHONG), reciprocal=False))
 
 
 def check_families(families):

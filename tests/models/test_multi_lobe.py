@@ -119,16 +119,26 @@ BAD = [
         LAMBERTIAN,
         (0.1, -0.1, 0.1),
         {},
-        "lambertian: albedo: expected three numbers of at least 0, found (0.1, -0.1, 0.1)",
+        "lambertian: albedo: expected three numbers of at least 0, at most 1e+30, found (0.1, -0.1, 0.1)",
     ),
     (
         LAMBERTIAN,
         (0.1, 0.1, np.nan),
         {},
-        "lambertian: albedo: expected three numbers of at least 0, found (0.1, 0.1, nan)",
+        "lambertian: albedo: expected three numbers of at least 0, at most 1e+30, found (0.1, 0.1, nan)",
     ),
-    (LAMBERTIAN, (np.inf, 1, 1), {}, "lambertian: albedo: expected three numbers of at least 0, found (inf, 1, 1)"),
-    (LAMBERTIAN, (0.1, 0.1), {}, "lambertian: albedo: expected three numbers of at least 0, found (0.1, 0.1)"),
+    (
+        LAMBERTIAN,
+        (np.inf, 1, 1),
+        {},
+        "lambertian: albedo: expected three numbers of at least 0, at most 1e+30, found (inf, 1, 1)",
+    ),
+    (
+        LAMBERTIAN,
+        (0.1, 0.1),
+        {},
+        "lambertian: albedo: expected three numbers of at least 0, at most 1e+30, found (0.1, 0.1)",
+    ),
 ]
 
 

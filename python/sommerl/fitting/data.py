@@ -13,6 +13,7 @@ from ..half_diff import directions
 from ..lattice import MERL
 from .options import FitOptions
 
+DARKEST, BRIGHTEST = 1e-15, 1e15  # [1/sr], of what is largest: squares keep their digits between these
 DIAMETER = 230  # of a sphere, in pixels: nine tenths of a picture of 256
 
 
@@ -26,16 +27,21 @@ class Samples:
 
     @classmethod
     def of(cls, brdf: Brdf, options: FitOptions) -> Samples:
-        """A material's. Raises MaterialError if a value is not a number, or all are 0."""
+        """A material's. Raises MaterialError if a value is negative or not a number, or all are 0 or nearly so."""
         wi, wo = sphere(options.samples, options.seed) if options.sampling == "sphere" else lattice(brdf)
         f_r = brdf.eval(wi, wo)
-        unusable = int((~np.isfinite(f_r)).any(axis=-1).sum())
+        unusable = int((~(np.isfinite(f_r) & (f_r >= 0))).any(axis=-1).sum())
         if unusable:
             raise MaterialError(
-                f"{brdf.name}: expected finite reflectance, found others in {unusable} of {len(wi)} directions"
+                f"{brdf.name}: expected finite reflectance of at least 0, found others in {unusable} of {len(wi)} "
+                "directions"
             )
-        if not (f_r > 0).any():
+        if not f_r.any():
             raise MaterialError(f"{brdf.name}: expected a positive reflectance in some direction, found none")
+        if not DARKEST <= f_r.max() <= BRIGHTEST:
+            raise MaterialError(
+                f"{brdf.name}: expected a largest reflectance of {DARKEST:g} to {BRIGHTEST:g}, found {f_r.max():g}"
+            )
         return cls(wi, wo, f_r)
 
     def every(self, step: int) -> Samples:

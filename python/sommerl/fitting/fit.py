@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..brdf import Brdf
-from ..models.multi_lobe import Lobe, MultiLobe
+from ..models.multi_lobe import MultiLobe
 from .data import Samples
-from .options import FitOptions, all_models, families_of
+from .options import FitOptions, all_models, families_of, family
 from .search import REFINED, Search
 
 Progress = Callable[[int, int], None]  #: steps done, steps in all
@@ -18,9 +18,10 @@ Progress = Callable[[int, int], None]  #: steps done, steps in all
 
 @dataclass(frozen=True)
 class Start:
-    """Where a search started, and the error, over all samples, of what it found on a part of them."""
+    """Where a search started: the shape of each lobe, and the error, over all samples, of what it found on a part of
+    them, before the best were refined."""
 
-    lobes: list[Lobe]
+    shapes: list[dict[str, float]]
     error: float
 
 
@@ -46,6 +47,7 @@ class Fit:
         return {
             "model": self.model,
             "lobes": len(self.brdf.lobes),
+            "source": family(self.model).source,
             "loss": self.options.loss,
             "error": self.error,
             "relative_error": self.relative_error,
@@ -54,7 +56,7 @@ class Fit:
             "samples": self.samples,
             "seed": self.options.seed,
             "conserve_energy": self.options.conserve_energy,
-            "starts": [{"parameters": [o.shape for o in s.lobes], "error": s.error} for s in self.starts],
+            "starts": [{"parameters": s.shapes, "error": s.error} for s in self.starts],
             "seconds": self.seconds,
         }
 
@@ -102,7 +104,7 @@ def fit_models(
                 options,
                 best.error,
                 best.error / search.whole.scale,
-                [Start(search.lobes(end.start, end.albedos), end.error) for end in ends],
+                [Start([dict(o.shape) for o in search.lobes(end.start, end.albedos)], end.error) for end in ends],
                 len(samples.wi),
                 time.perf_counter() - started,
             )

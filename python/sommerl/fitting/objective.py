@@ -227,6 +227,10 @@ def least_squares(gram: Matrix, data: Matrix, most: float | None) -> Matrix:
     found = np.stack([nnls(root, column)[0] for column in right.T], axis=1) * scale[:, None]
     if most is not None:
         for channel in np.flatnonzero(found.sum(axis=0) > most):
-            exact, target = np.vstack([root, HEAVY * scale]), np.append(right[:, channel], HEAVY * most)
-            found[:, channel] = nnls(exact, target)[0] * scale
+            # One more equation, Σ x = most, with a weight that lets it hold exactly, whatever the units are.
+            size = np.linalg.norm(right[:, channel]) * scale
+            exact = np.vstack([root, HEAVY * size / size.max()])
+            target = np.append(right[:, channel] / np.linalg.norm(right[:, channel]), HEAVY * most / size.max())
+            found[:, channel] = nnls(exact, target)[0] * size
+            found[:, channel] *= min(1.0, most / found[:, channel].sum())
     return found

@@ -31,7 +31,8 @@ class FitOptions:
         cells, MERL's if the material has none.
     starts: how many places a search begins at; the first is the one of `Parameter.start`, all others are random.
     seed: of directions and starts.
-    conserve_energy: lets the albedos of a channel sum to 1 at most.
+    conserve_energy: lets the albedos of a channel sum to 1 at most: what comes back is then no more than what comes in,
+        for families that promise as much (`Family.conserves_energy`).
 
     Raises OptionError for values outside these.
     """
@@ -58,10 +59,11 @@ class FitOptions:
 
 
 def family(model: str) -> Family:
-    """The family of that name. Raises OptionError, with all names and the nearest, if there is none."""
+    """The family of that name. Raises OptionError, with all names, if there is none."""
     if model not in FAMILIES:
-        nearest = difflib.get_close_matches(model, FAMILIES, 1, 0.0)[0]
-        raise OptionError(f"model: expected {', '.join(FAMILIES)} or all, found {model}; did you mean {nearest}?")
+        nearest = difflib.get_close_matches(model.lower(), FAMILIES, 1)
+        hint = f"; did you mean {nearest[0]}?" if nearest else ""
+        raise OptionError(f"model: expected {', '.join(FAMILIES)} or all, found {model}{hint}")
     return FAMILIES[model]
 
 

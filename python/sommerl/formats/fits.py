@@ -13,10 +13,11 @@ from typing import Any, cast
 from ..errors import FormatError, MaterialError
 from ..files import atomic_write
 from ..models.multi_lobe import FAMILIES, Lobe, MultiLobe
+from .names import visible
 
 KEY, VERSION = "sommerl_fits", 1
 LARGEST_FILE = 2**24  # bytes
-MOST_LOBES = 100
+MOST_LOBES, LONGEST_NAME = 100, 200
 
 
 def looks_like(head: bytes) -> bool:
@@ -43,18 +44,20 @@ def read(path: str | Path, member: str = "") -> MultiLobe:
     except (ValueError, RecursionError) as error:
         raise FormatError(f"{path}: expected JSON, found something else ({error})") from error
     top = _mapping(path, "the file", found)
-    if top.get(KEY) != VERSION:
-        raise FormatError(f"{path}: {KEY}: expected {VERSION}, found {top.get(KEY)!r:.40}")
+    if type(top.get(KEY)) is not int or top[KEY] != VERSION:
+        what = f"found {top[KEY]!r:.40}" if KEY in top else "found another JSON file"
+        raise FormatError(f'{path}: expected fits as `sommerl fit` writes them, with "{KEY}": {VERSION}, {what}')
     fits = [_mapping(path, "fits", fit) for fit in _sequence(path, "fits", top.get("fits"))]
-    models = [str(fit.get("model")) for fit in fits]
+    models = [_name(path, "model", fit.get("model")) for fit in fits]
+    material = _name(path, "material", top.get("material"))
     if not fits:
         raise FormatError(f"{path}: fits: expected one or more, found none")
     if member and member not in models:
-        raise FormatError(f"{path}: expected one of {', '.join(models)}, found {member}")
+        raise FormatError(f"{path}: expected one of {', '.join(models[:20])}, found {visible(member)}")
     at = models.index(member) if member else 0
     try:
         lobes = [_lobe(path, lobe) for lobe in _sequence(path, "parameters", fits[at].get("parameters"))]
-        return MultiLobe(f"{top.get('material')} ({models[at]} fit)", lobes)
+        return MultiLobe(f"{material} ({models[at]} fit)", lobes)
     except MaterialError as error:
         raise FormatError(f"{path}: {error}") from error
 
@@ -64,10 +67,26 @@ def _lobe(path: Path, found: Any) -> Lobe:
     family = FAMILIES.get(str(numbers.pop("family", None)))
     if family is None:
         raise FormatError(f"{path}: parameters: expected a family of {', '.join(FAMILIES)}, found another or none")
-    albedo = _sequence(path, "albedo", numbers.pop("albedo", None))
-    if not all(type(value) in (int, float) for value in (*albedo, *numbers.values())):
-        raise FormatError(f"{path}: {family.name}: expected numbers, found something else")
-    return Lobe(family, cast(tuple[float, float, float], tuple(albedo)), numbers)
+    albedo = [_number(path, family.name, value) for value in _sequence(path, "albedo", numbers.pop("albedo", None))]
+    shape = {_name(path, family.name, key): _number(path, family.name, value) for key, value in numbers.items()}
+    return Lobe(family, cast(tuple[float, float, float], tuple(albedo)), shape)
+
+
+def _number(path: Path, field: str, value: Any) -> float:
+    try:
+        if type(value) in (int, float):
+            return float(value)
+    except OverflowError:  # Python's whole numbers have no end
+        pass
+    raise FormatError(f"{path}: {field}: expected numbers, found something else")
+
+
+def _name(path: Path, field: str, value: Any) -> str:
+    if not isinstance(value, str) or len(value) > LONGEST_NAME:
+        raise FormatError(
+            f"{path}: {field}: expected a name of at most {LONGEST_NAME} characters, found something else"
+        )
+    return visible(value)
 
 
 def _mapping(path: Path, field: str, value: Any) -> dict[str, Any]:

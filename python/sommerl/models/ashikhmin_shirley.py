@@ -24,7 +24,6 @@ def exponent(n: float, f0: float) -> float:
 
 ASHIKHMIN_SHIRLEY = Family(
     name="ashikhmin-shirley",
-    title="Ashikhmin-Shirley",
     source="Ashikhmin & Shirley 2000, An Anisotropic Phong BRDF Model, Journal of Graphics Tools 5(2), Eq. 4",
     parameters=(Parameter("n", 1.0, 1e5, 100.0, "logarithmic"), F0),
     lobe=lobe,

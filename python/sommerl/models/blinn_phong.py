@@ -1,7 +1,7 @@
 """Blinn 1977, "Models of Light Reflection for Computer Synthesized Pictures", SIGGRAPH: a cosine power of θ_h.
 
-The factor makes the albedo 1 for wo along the normal, where it is largest; it is that of Akenine-Möller, Haines &
-Hoffman 2008, "Real-Time Rendering", 3rd edition, section 7.6.
+The factor makes the albedo 1 for wo along the normal, where it is largest; Giesen 2009, "Phong
+Normalization Factor derivation", derives it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ def exponent(n: float) -> float:
 
 BLINN_PHONG = Family(
     name="blinn-phong",
-    title="Blinn-Phong",
     source="Blinn 1977, Models of Light Reflection for Computer Synthesized Pictures, SIGGRAPH",
     parameters=(Parameter("n", 1.0, 1e5, 100.0, "logarithmic"),),
     lobe=lobe,

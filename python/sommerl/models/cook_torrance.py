@@ -25,7 +25,6 @@ def lobe(a: Angles, m: Array, f0: Array) -> Array:
 
 COOK_TORRANCE = Family(
     name="cook-torrance",
-    title="Cook-Torrance",
     source="Cook & Torrance 1982, A Reflectance Model for Computer Graphics, ACM Transactions on Graphics 1(1)",
     parameters=(SLOPE, F0),
     lobe=lobe,

@@ -1,4 +1,4 @@
-"""What every family of lobes is: a formula for an albedo of one, its parameters, and where it sends the light."""
+"""What every family of lobes is: a formula, its parameters, and where it sends the light."""
 
 from __future__ import annotations
 
@@ -45,8 +45,9 @@ class Parameter:
 class Family:
     """A family of lobes.
 
-    title: its name in print. source: who published it, where.
-    lobe: f_r [1/sr] for an albedo of one, from Angles and one number a parameter, on NumPy and on Dr.Jit arrays.
+    source: who published it, where.
+    lobe: f_r [1/sr] for an albedo of one, which is a factor (with a Fresnel term, less comes back), from Angles and one
+        number a parameter, on NumPy and on Dr.Jit arrays.
     reciprocal: whether it promises the same for wi and wo swapped. conserves_energy: whether it promises to reflect no
         more than its albedo's share of the light, from wherever it comes.
     exponent: for importance sampling, the exponent of Blinn-Phong's lobe whose half vectors are about as wide, from the
@@ -54,7 +55,6 @@ class Family:
     """
 
     name: str
-    title: str
     source: str
     parameters: tuple[Parameter, ...]
     lobe: Callable[..., Array]

@@ -36,7 +36,6 @@ def lobe(a: Angles, alpha: Array, f0: Array) -> Array:
 
 GGX = Family(
     name="ggx",
-    title="GGX",
     source="Walter, Marschner, Li & Torrance 2007, Microfacet Models for Refraction through Rough Surfaces, EGSR",
     parameters=(Parameter("alpha", 0.002, 1.0, 0.15, "logarithmic"), F0),
     lobe=lobe,

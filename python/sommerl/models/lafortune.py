@@ -25,7 +25,6 @@ def exponent(c_xy: float, n: float) -> float:
 
 LAFORTUNE = Family(
     name="lafortune",
-    title="Lafortune",
     source="Lafortune, Foo, Torrance & Greenberg 1997, Non-Linear Approximation of Reflectance Functions, SIGGRAPH",
     parameters=(Parameter("c_xy", -2.0, 2.0, -1.0), Parameter("n", 1.0, 1e5, 30.0, "logarithmic")),
     lobe=lobe,

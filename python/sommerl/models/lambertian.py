@@ -13,7 +13,6 @@ def lobe(a: Angles) -> Array:
 
 LAMBERTIAN = Family(
     name="lambertian",
-    title="Lambertian",
     source="Lambert 1760, Photometria",
     parameters=(),
     lobe=lobe,

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -47,6 +46,8 @@ FAMILIES: dict[str, Family] = {
     )
 }
 
+LARGEST_ALBEDO = 1e30  # renderers calculate in single precision
+
 
 @dataclass(frozen=True)
 class Lobe:
@@ -69,8 +70,10 @@ class Lobe:
                 raise MaterialError(
                     f"{name}: {key}: expected {bounds[key].low:g} to {bounds[key].high:g}, found {value:g}"
                 )
-        if len(self.albedo) != 3 or not all(isfinite(value) and value >= 0 for value in self.albedo):
-            raise MaterialError(f"{name}: albedo: expected three numbers of at least 0, found {self.albedo}")
+        if len(self.albedo) != 3 or not all(0 <= value <= LARGEST_ALBEDO for value in self.albedo):
+            raise MaterialError(
+                f"{name}: albedo: expected three numbers of at least 0, at most {LARGEST_ALBEDO:g}, found {self.albedo}"
+            )
 
     def as_json(self) -> dict[str, Any]:
         return {"family": self.family.name, "albedo": list(self.albedo), **self.shape}
@@ -99,10 +102,6 @@ class MultiLobe(Brdf):
             raise MaterialError(f"{name}: expected one lobe or more, found none")
         self.name = name
         self.lobes = tuple(lobes)
-
-    @property
-    def reciprocal(self) -> bool:
-        return all(lobe.family.reciprocal for lobe in self.lobes)
 
     def buffers(self) -> dict[str, NDArray[Any]]:
         # In a buffer, and not in the formula, so that materials of the same families share one compiled kernel.

@@ -25,7 +25,6 @@ def lobe(a: Angles, sigma: Array) -> Array:
 
 OREN_NAYAR = Family(
     name="oren-nayar",
-    title="Oren-Nayar",
     source="Oren & Nayar 1994, Generalization of Lambert's Reflectance Model, SIGGRAPH, Eq. 30",
     parameters=(Parameter("sigma", 0.0, PI / 2, 0.3),),
     lobe=lobe,

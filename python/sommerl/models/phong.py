@@ -24,7 +24,6 @@ def exponent(n: float) -> float:
 
 PHONG = Family(
     name="phong",
-    title="Phong",
     source="Lafortune & Willems 1994, Using the Modified Phong Reflectance Model, KU Leuven CW 197, Eq. 3",
     parameters=(Parameter("n", 1.0, 1e5, 30.0, "logarithmic"),),
     lobe=lobe,

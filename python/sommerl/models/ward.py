@@ -25,7 +25,6 @@ def lobe(a: Angles, alpha: Array) -> Array:
 
 WARD = Family(
     name="ward",
-    title="Ward",
     source="Ward 1992, Measuring and Modeling Anisotropic Reflection, SIGGRAPH, Eq. 4",
     parameters=(ALPHA,),
     lobe=lobe,

@@ -18,7 +18,6 @@ def lobe(a: Angles, alpha: Array) -> Array:
 
 WARD_DUER = Family(
     name="ward-duer",
-    title="Ward-Duer",
     source="Dür 2006, An Improved Normalization for the Ward Reflectance Model, Journal of Graphics Tools 11(1)",
     parameters=(ALPHA,),
     lobe=lobe,

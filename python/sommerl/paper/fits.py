@@ -26,7 +26,8 @@ Progress = Callable[[int, int], None]  #: steps done, steps in all
 
 @dataclass(frozen=True)
 class FitRow:
-    """An error of a fit to the table and of one to the compressed table: ours, and the paper's."""
+    """The errors of a fit to the table and of one to the compressed table, each against what it was fitted to: ours,
+    and the paper's."""
 
     material: str
     model: str
@@ -89,7 +90,8 @@ def figure6(
     *,
     progress: Progress | None = None,
 ) -> list[FitRow]:
-    """Green-metallic-paint: three-lobe fits to the table and to its compressed form of M = 1000."""
+    """Green-metallic-paint: three-lobe fits to the table and to its compressed form of M = 1000. The picture compares
+    all with the table."""
     options = replace(options or FitOptions(), lobes=3)
     table, ours = _both(data, "green-metallic-paint")
     fitted = _fitted(table, ours, expected("fig6"), options, _part(progress, 0, 2))

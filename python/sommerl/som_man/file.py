@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from .. import _core
 from ..errors import FormatError, SommerlError
 from ..files import atomic_write
+from ..formats.names import visible
 from ..lattice import INTERPOLATIONS, Lattice
 from ..nodes import NodeLattice
 from .codes import coordinates, gain_codes, gain_values, shape_codes, shape_values
@@ -69,8 +70,7 @@ def load(path: str | Path) -> SomManBrdf:
         material = decode(path.read_bytes())
     except SommerlError as error:
         raise FormatError(f"{path}: {error}") from error
-    # Names are shown on terminals, which obey some of what cannot be printed.
-    material.name = "".join(c if c.isprintable() else "�" for c in material.name)
+    material.name = visible(material.name)
     return material
 
 
