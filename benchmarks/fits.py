@@ -19,10 +19,11 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from sommerl import load_table
-from sommerl.fitting.data import Samples
+from sommerl.fitting.data import samples_of
 from sommerl.fitting.objective import LOG_EPSILON
 from sommerl.fitting.options import FitOptions, Loss, families_of
 from sommerl.fitting.search import Search
+from sommerl.formats.scattered import Samples
 from sommerl.models.family import Family
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
 
@@ -87,7 +88,7 @@ def main() -> None:
     options = FitOptions(samples=given.samples, loss=given.loss)
     print(f"{'':42}     ours   SciPy trf   searched: error, time")
     for material in given.materials:
-        samples = Samples.of(load_table(material), options)
+        samples = samples_of(load_table(material), options)
         for model in MODELS:
             families = families_of(model, 2)
             linear = given.loss in ("l2", "cosine-l2")

@@ -17,7 +17,8 @@ import numpy as np
 
 from sommerl import Brdf, builtin_table
 from sommerl.fitting import FitOptions, fit_models
-from sommerl.fitting.data import Samples
+from sommerl.fitting.data import samples_of
+from sommerl.formats.scattered import Samples
 from sommerl.paper.data import compressed, expected
 
 
@@ -39,7 +40,7 @@ def main() -> None:
     for name, models in expected("table1").items():
         clean, noisy = builtin_table(name), builtin_table(name, noise=given.seed)
         ours = compressed(noisy, 1000).with_interpolation("trilinear")
-        truth = Samples.of(clean, options)
+        truth = samples_of(clean, options)
         fits = [fit_models(brdf, list(models), options) for brdf in (clean, noisy, ours)]
         for to_clean, to_noisy, to_ours in zip(*fits, strict=True):
             errors = [error(fit.brdf, truth) for fit in (to_clean, to_noisy, to_ours)]

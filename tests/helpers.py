@@ -1,5 +1,6 @@
 """Small tables that many tests share, and what runs checks that must be able to fail."""
 
+import json
 import os
 import shutil
 from collections.abc import Callable
@@ -10,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from sommerl import BrdfTable, Lattice, SomManBrdf
+from sommerl.cli import main
 from sommerl.errors import SommerlError
 from sommerl.nodes import NodeLattice
 from sommerl.som_man.codes import gain_values, shape_values
@@ -73,3 +75,21 @@ def compact_material(lattice: NodeLattice, gains: int = 20, shapes: int = 15, *,
         scale=0.04,
         name=name,
     )
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[Any, str, str]:
+    """Exit status, standard output and standard error of a command."""
+    capsys.readouterr()
+    try:
+        status = main([str(argument) for argument in arguments])
+    except SystemExit as stop:
+        status = stop.code
+    captured = capsys.readouterr()
+    return status, captured.out, captured.err
+
+
+def run_json(capsys: pytest.CaptureFixture[str], *arguments: object) -> Any:
+    """What a command prints with --json."""
+    status, out, err = run(capsys, *arguments, "--json")
+    assert (status, err) == (0, "")
+    return json.loads(out)

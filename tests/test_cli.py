@@ -1,4 +1,3 @@
-import json
 import os
 import signal
 import subprocess
@@ -8,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers import must_fail
+from helpers import must_fail, run, run_json
 
 from sommerl import NAMES, BrdfTable, Lattice, load
 from sommerl.cli import main
@@ -35,23 +34,6 @@ def folder(tmp_path_factory):
     assert main(["convert", "pearl-paint", str(folder / "pearl.binary")]) == 0
     assert main(["compress", str(folder / "pearl.binary"), "-o", str(folder / "pearl.smrl"), *QUICK]) == 0
     return folder
-
-
-def run(capsys, *arguments):
-    """Exit status, standard output and standard error of a command."""
-    capsys.readouterr()
-    try:
-        status = main([str(argument) for argument in arguments])
-    except SystemExit as stop:
-        status = stop.code
-    captured = capsys.readouterr()
-    return status, captured.out, captured.err
-
-
-def run_json(capsys, *arguments):
-    status, out, err = run(capsys, *arguments, "--json")
-    assert (status, err) == (0, "")
-    return json.loads(out)
 
 
 def test_compress_and_info(capsys, folder, tmp_path):

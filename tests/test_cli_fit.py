@@ -5,8 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from helpers import must_fail
-from test_cli import run, run_json
+from helpers import must_fail, run, run_json
 
 from sommerl import NAMES, BrdfTable, builtin
 from sommerl.formats import merl

@@ -5,10 +5,9 @@ import subprocess
 
 import numpy as np
 import pytest
-from helpers import compact_material, must_fail, random_directions, tool
+from helpers import compact_material, must_fail, random_directions, run, run_json, tool
 
 from sommerl import MERL, BrdfTable, load, save
-from sommerl.cli import main
 from sommerl.errors import MaterialError
 from sommerl.formats import merl, rgl
 from sommerl.load import interpolated
@@ -26,20 +25,6 @@ def path(tmp_path_factory):
     path = tmp_path_factory.mktemp("materials") / "tiny.smrl"
     save(compact_material(LATTICE, 5, 4, name="tiny"), path)
     return path
-
-
-def run(capsys, *arguments):
-    """Exit status, standard output and standard error of a command."""
-    capsys.readouterr()
-    status = main([*map(str, arguments)])
-    captured = capsys.readouterr()
-    return status, captured.out, captured.err
-
-
-def run_json(capsys, *arguments):
-    status, out, err = run(capsys, *arguments, "--json")
-    assert (status, err) == (0, "")
-    return json.loads(out)
 
 
 def test_info(capsys, path):

@@ -1,10 +1,8 @@
 """`sommerl convert`, and the loading of every format by its content."""
 
-import json
-
 import numpy as np
 import pytest
-from helpers import lambertian_table, must_fail, random_directions
+from helpers import lambertian_table, must_fail, random_directions, run_json
 from rgl_files import content
 
 from sommerl import BrdfTable, Lattice, TrainOptions, builtin, commands, load, save, train
@@ -12,12 +10,6 @@ from sommerl.cli import main
 from sommerl.formats import merl
 
 A, B = (w[w[:, 2] > 0.1][:200] for w in (random_directions(300, s) for s in (1, 2)))
-
-
-def run_json(capsys, *arguments):
-    assert main([*map(str, arguments), "--json"]) == 0
-    captured = capsys.readouterr()
-    return json.loads(captured.out)
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 from sommerl import Brdf, BrdfTable, Lattice, TrainOptions, builtin, train
 from sommerl.errors import MaterialError, OptionError
 from sommerl.fitting import FitOptions, fit, fit_all
-from sommerl.fitting.data import Samples
+from sommerl.fitting.data import samples_of
 from sommerl.fitting.search import Search
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
 
@@ -90,14 +90,14 @@ def check_no_worse(error, outside):
 def test_no_worse_than_least_squares(model):
     """The other models, and 50 starts: benchmarks/fits.py."""
     material, options = builtin("pearl-paint"), FitOptions(samples=1500)
-    outside = by_least_squares(Samples.of(material, options), FAMILIES[model], 5)
+    outside = by_least_squares(samples_of(material, options), FAMILIES[model], 5)
     error = fit(material, model, options).error
     check_no_worse(error, outside)
     must_fail(check_no_worse, 1.001 * error, error)
 
 
 def test_solved_albedos_are_no_worse_than_searched_ones():
-    samples = Samples.of(builtin("pearl-paint"), FEW)
+    samples = samples_of(builtin("pearl-paint"), FEW)
     families = (FAMILIES["lambertian"], FAMILIES["ashikhmin-shirley"])
     solving, searching = (Search(families, samples, FEW) for _ in range(2))
     searching.solves = False
@@ -113,7 +113,7 @@ def check_found_from_anywhere(errors):
 def test_other_starts_find_the_same():
     """Three lobes and a loss that is not linear: the longest search."""
     options = FitOptions(samples=3000, loss="log", lobes=3)
-    samples = Samples.of(builtin("nickel"), options)
+    samples = samples_of(builtin("nickel"), options)
     families = [FAMILIES[name] for name in ("lambertian", "lafortune", "lafortune")]
     searches = [Search(families, samples, replace(options, seed=seed)) for seed in range(3)]
     errors = [search.run(lambda done: None)[0].error for search in searches]

@@ -4,14 +4,14 @@ from helpers import must_fail
 
 from sommerl import builtin
 from sommerl.fitting import FitOptions
-from sommerl.fitting.data import DIAMETER, Samples, lattice, sphere
+from sommerl.fitting.data import DIAMETER, lattice, samples_of, sphere
 from sommerl.fitting.objective import LOG_EPSILON, Objective, least_squares
 from sommerl.fitting.options import families_of
 from sommerl.lattice import MERL
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
 
 LOSSES = ("l2", "cosine-l2", "log", "cube-root")
-SAMPLES = Samples.of(builtin("purple-paint"), FitOptions(samples=3000))
+SAMPLES = samples_of(builtin("purple-paint"), FitOptions(samples=3000))
 STEP = 1e-6
 
 

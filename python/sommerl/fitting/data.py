@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..brdf import Brdf, OnLattice
 from ..errors import MaterialError
+from ..formats.scattered import Samples
 from ..half_diff import directions
 from ..lattice import MERL
 from .options import FitOptions
@@ -17,35 +16,23 @@ DARKEST, BRIGHTEST = 1e-15, 1e15  # [1/sr], of what is largest: squares keep the
 DIAMETER = 230  # of a sphere, in pixels: nine tenths of a picture of 256
 
 
-@dataclass(frozen=True)
-class Samples:
-    """Directions to the light and to the viewer, and f_r [1/sr], each of shape (n, 3)."""
-
-    wi: NDArray[np.float64]
-    wo: NDArray[np.float64]
-    f_r: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, brdf: Brdf, options: FitOptions) -> Samples:
-        """A material's. Raises MaterialError if a value is negative or not a number, or all are 0 or nearly so."""
-        wi, wo = sphere(options.samples, options.seed) if options.sampling == "sphere" else lattice(brdf)
-        f_r = brdf.eval(wi, wo)
-        unusable = int((~(np.isfinite(f_r) & (f_r >= 0))).any(axis=-1).sum())
-        if unusable:
-            raise MaterialError(
-                f"{brdf.name}: expected finite reflectance of at least 0, found others in {unusable} of {len(wi)} "
-                "directions"
-            )
-        if not f_r.any():
-            raise MaterialError(f"{brdf.name}: expected a positive reflectance in some direction, found none")
-        if not DARKEST <= f_r.max() <= BRIGHTEST:
-            raise MaterialError(
-                f"{brdf.name}: expected a largest reflectance of {DARKEST:g} to {BRIGHTEST:g}, found {f_r.max():g}"
-            )
-        return cls(wi, wo, f_r)
-
-    def every(self, step: int) -> Samples:
-        return Samples(self.wi[::step], self.wo[::step], self.f_r[::step])
+def samples_of(brdf: Brdf, options: FitOptions) -> Samples:
+    """A material's. Raises MaterialError if a value is negative or not a number, or all are 0 or nearly so."""
+    wi, wo = sphere(options.samples, options.seed) if options.sampling == "sphere" else lattice(brdf)
+    f_r = brdf.eval(wi, wo)
+    unusable = int((~(np.isfinite(f_r) & (f_r >= 0))).any(axis=-1).sum())
+    if unusable:
+        raise MaterialError(
+            f"{brdf.name}: expected finite reflectance of at least 0, found others in {unusable} of {len(wi)} "
+            "directions"
+        )
+    if not f_r.any():
+        raise MaterialError(f"{brdf.name}: expected a positive reflectance in some direction, found none")
+    if not DARKEST <= f_r.max() <= BRIGHTEST:
+        raise MaterialError(
+            f"{brdf.name}: expected a largest reflectance of {DARKEST:g} to {BRIGHTEST:g}, found {f_r.max():g}"
+        )
+    return Samples(wi, wo, f_r)
 
 
 def sphere(count: int, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..brdf import Brdf
 from ..models.multi_lobe import MultiLobe
-from .data import Samples
+from .data import samples_of
 from .options import FitOptions, all_models, families_of, family
 from .search import REFINED, Search
 
@@ -85,7 +85,7 @@ def fit_models(
     """
     options = options or FitOptions()
     sums = [families_of(model, options.lobes, alone=len(models) == 1) for model in models]
-    samples = Samples.of(brdf, options)
+    samples = samples_of(brdf, options)
     steps = options.starts + REFINED
     found: list[Fit] = []
     for model, families in zip(models, sums, strict=True):

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, split
+from ..formats.scattered import Samples
 from ..jit import drjit, float64
 from ..models.family import Angles, Family
 from ..optional import optional
-from .data import Samples
 from .options import Loss
 
 Matrix = NDArray[np.float64]

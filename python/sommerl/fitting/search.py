@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..formats.scattered import Samples
 from ..models.family import Family
 from ..models.multi_lobe import Lobe
 from ..optional import optional
-from .data import Samples
 from .objective import Matrix, Objective
 from .options import FitOptions
 
@@ -50,7 +50,9 @@ class Search:
     def __init__(self, families: Sequence[Family], samples: Samples, options: FitOptions) -> None:
         step = max(1, min(FEWER, len(samples.wi) // FEWEST))
         self.whole = Objective(families, samples, options.loss)
-        self.part = self.whole if step == 1 else Objective(families, samples.every(step), options.loss)
+        self.part = (
+            self.whole if step == 1 else Objective(families, samples.some(slice(None, None, step)), options.loss)
+        )
         self.solves = self.whole.linear  #: whether albedos are solved for, and not searched
         self._options = options
         self._most = 1.0 if options.conserve_energy else None

@@ -50,8 +50,8 @@ class Samples:
         wi, wo = (np.stack(spherical(angles[:, k], angles[:, k + 1]), axis=-1) for k in (0, 2))
         return cls(wi, wo, f_r)
 
-    def some(self, which: NDArray[Any]) -> Samples:
-        """Those of a mask, or with the given numbers."""
+    def some(self, which: NDArray[Any] | slice) -> Samples:
+        """Those of a mask, of a slice, or with the given numbers."""
         return Samples(self.wi[which], self.wo[which], self.f_r[which])
 
 
