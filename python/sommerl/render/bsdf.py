@@ -12,17 +12,18 @@ from numpy.typing import NDArray
 from ..arrays import Packed16
 from ..brdf import Brdf
 from ..load import interpolated, load
-from ..sampling import BlinnPhongSampler
+from ..sampling.half_vector import HalfVectorSampler
+from ..sampling.sampler import Sampler
 from .llvm import drjit, mitsuba
 
 
-def make_bsdf(brdf: Brdf, sampler: BlinnPhongSampler | None = None) -> Any:
+def make_bsdf(brdf: Brdf, sampler: Sampler | None = None) -> Any:
     """A Mitsuba BSDF, to be put into a scene's dictionary. Only its front side reflects.
 
-    sampler: of directions; fitted to `brdf` if None. Give the reference's to every candidate that it is compared
+    sampler: of directions, see `sampling`; ours, fitted to `brdf`, if None. Give the reference's to every candidate that it is compared
     with, so that all are rendered with the same directions.
     """
-    return _plugin()(mitsuba().Properties(), brdf, sampler or BlinnPhongSampler.fitted(brdf))
+    return _plugin()(mitsuba().Properties(), brdf, sampler or HalfVectorSampler.fitted(brdf))
 
 
 def register() -> None:
@@ -43,14 +44,17 @@ def _from_properties(props: Any) -> Any:
     brdf = load(found)
     if "interpolation" in props:
         brdf = interpolated(brdf, props["interpolation"])
-    return _plugin()(props, brdf, BlinnPhongSampler.fitted(brdf))
+    return _plugin()(props, brdf, HalfVectorSampler.fitted(brdf))
 
 
 def upload(buffer: NDArray[Any]) -> Any:
-    """A flat NumPy buffer as the array that Dr.Jit gathers from; in scalar mode, as it is."""
+    """A flat NumPy buffer as the array that Dr.Jit gathers from; one of shape () as a number; in scalar mode, as it is."""
     mi, dr = mitsuba(), drjit()
     if mi.variant().startswith("scalar"):
-        return buffer
+        return buffer if buffer.ndim else float(buffer)
+    if not buffer.ndim:
+        # Opaque, so that materials which differ in these numbers alone share one compiled kernel.
+        return dr.opaque(mi.Float, float(buffer))
     match buffer.dtype:
         case np.uint8:
             return dr.uint8_array_t(mi.Float)(buffer)
@@ -72,19 +76,17 @@ def _plugin_for(variant: str) -> Any:
     mi, dr = mitsuba(), drjit()
 
     class SommerlBsdf(mi.BSDF):
-        def __init__(self, props: Any, brdf: Brdf, sampler: BlinnPhongSampler) -> None:
+        def __init__(self, props: Any, brdf: Brdf, sampler: Sampler) -> None:
             mi.BSDF.__init__(self, props)
             self._brdf = brdf
             self._buffers = {name: upload(buffer) for name, buffer in brdf.buffers().items()}
-            # Opaque, so that materials which differ in these numbers alone share one compiled kernel.
-            self._sampler = BlinnPhongSampler(
-                dr.opaque(mi.Float, float(sampler.exponent)), dr.opaque(mi.Float, float(sampler.specular))
-            )
+            self._sampler = sampler
+            self._tables = {name: upload(buffer) for name, buffer in sampler.buffers().items()}
             self.m_components = [mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide]
             self.m_flags = self.m_components[0]
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
-            wi, pdf = self._sampler.sample(_triple(si.wi), (sample1, sample2.x, sample2.y))
+            wi, pdf = self._sampler.draw(_triple(si.wi), (sample1, sample2.x, sample2.y), self._tables)
             sample = dr.zeros(mi.BSDFSample3f)
             sample.wo = mi.Vector3f(*wi)
             sample.pdf = dr.select(active, pdf, 0.0)
@@ -104,7 +106,7 @@ def _plugin_for(variant: str) -> Any:
             return dr.select(above, mi.Color3f(*f_r) * light.z, 0.0)
 
         def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            return dr.select(active, self._sampler.pdf(_triple(wo), _triple(si.wi)), 0.0)
+            return dr.select(active, self._sampler.density(_triple(wo), _triple(si.wi), self._tables), 0.0)
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..brdf import Brdf
 from ..metrics import ImageMetrics, exposure, image_metrics, psnr, to_srgb8
-from ..sampling import BlinnPhongSampler
+from ..sampling.half_vector import HalfVectorSampler
 from .images import difference
 from .scenes import DEFAULT_SIZE, DEFAULT_SPP, Image, Progress, render, sphere
 
@@ -45,7 +45,7 @@ def compare_on_sphere(
     All are rendered with the reference's sampler and seed, hence with the same directions: what differs is the
     representation and not the noise.
     """
-    sampler = BlinnPhongSampler.fitted(reference)
+    sampler = HalfVectorSampler.fitted(reference)
     images: list[Image] = []
     for brdf in (reference, *candidates):
 
@@ -64,7 +64,7 @@ def judge_on_sphere(reference: Brdf, environment: NDArray[np.float32]) -> Callab
 
     The reference is rendered once.
     """
-    sampler = BlinnPhongSampler.fitted(reference)
+    sampler = HalfVectorSampler.fitted(reference)
     first = render(sphere(reference, environment, sampler=sampler))
     scale = exposure(first.pixels, first.mask)
     target = to_srgb8(first.pixels[first.mask] * scale)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..brdf import Brdf
-from ..sampling import BlinnPhongSampler
+from ..sampling.sampler import Sampler
 from .bsdf import make_bsdf
 from .llvm import drjit, mitsuba
 
@@ -33,7 +33,7 @@ class Image:
 
 
 def sphere(
-    brdf: Brdf, environment: NDArray[np.float32], *, sampler: BlinnPhongSampler | None = None, size: int = DEFAULT_SIZE
+    brdf: Brdf, environment: NDArray[np.float32], *, sampler: Sampler | None = None, size: int = DEFAULT_SIZE
 ) -> Any:
     """A Mitsuba scene: one sphere of the material in an environment that is visible behind it.
 
