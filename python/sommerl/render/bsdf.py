@@ -20,8 +20,8 @@ from .llvm import drjit, mitsuba
 def make_bsdf(brdf: Brdf, sampler: Sampler | None = None) -> Any:
     """A Mitsuba BSDF, to be put into a scene's dictionary. Only its front side reflects.
 
-    sampler: of directions, see `sampling`; ours, fitted to `brdf`, if None. Give the reference's to every candidate that it is compared
-    with, so that all are rendered with the same directions.
+    sampler: of directions, see `sampling`; ours, fitted to `brdf`, if None. Give the reference's to every candidate
+        that it is compared with, so that all are rendered with the same directions.
     """
     return _plugin()(mitsuba().Properties(), brdf, sampler or HalfVectorSampler.fitted(brdf))
 
@@ -48,7 +48,7 @@ def _from_properties(props: Any) -> Any:
 
 
 def upload(buffer: NDArray[Any]) -> Any:
-    """A flat NumPy buffer as the array that Dr.Jit gathers from; one of shape () as a number; in scalar mode, as it is."""
+    """A flat NumPy buffer as an array that Dr.Jit gathers from, one of shape () as a number."""
     mi, dr = mitsuba(), drjit()
     if mi.variant().startswith("scalar"):
         return buffer if buffer.ndim else float(buffer)
@@ -60,6 +60,8 @@ def upload(buffer: NDArray[Any]) -> Any:
             return dr.uint8_array_t(mi.Float)(buffer)
         case np.uint16:
             return Packed16(mi.UInt32(np.append(buffer, np.zeros(len(buffer) % 2, np.uint16)).view("<u4")))
+        case np.uint32:
+            return mi.UInt32(buffer)
         case _:
             array = mi.Float(buffer.astype(np.float32))
             dr.make_opaque(array)

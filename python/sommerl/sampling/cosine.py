@@ -10,13 +10,6 @@ from ..half_diff import TWO_PI
 from .sampler import PI, Sampler
 
 
-def cosine_weighted(u: Array, v: Array) -> Triple:
-    """A direction of density cos θ / π for uniform random numbers in [0, 1)."""
-    f = ops(u)
-    sin, z = f.sqrt(u), f.sqrt(1.0 - u)
-    return sin * f.cos(TWO_PI * v), sin * f.sin(TWO_PI * v), z
-
-
 @dataclass(frozen=True)
 class CosineSampler(Sampler):
     """Directions of density cos θ_i / π."""
@@ -24,8 +17,14 @@ class CosineSampler(Sampler):
     brdf: Brdf
     name = "cosine"
 
+    @classmethod
+    def fitted(cls, brdf: Brdf) -> CosineSampler:
+        return cls(brdf)
+
     def draw(self, wo: Triple, u: Triple, buffers: Buffers) -> tuple[Triple, Array]:
-        wi = cosine_weighted(u[1], u[2])
+        f = ops(wo[0])
+        sin = f.sqrt(u[1])
+        wi = sin * f.cos(TWO_PI * u[2]), sin * f.sin(TWO_PI * u[2]), f.sqrt(1.0 - u[1])
         return wi, self.density(wi, wo, buffers)
 
     def density(self, wi: Triple, wo: Triple, buffers: Buffers) -> Array:

@@ -1,14 +1,15 @@
 """Our sampler: half vectors from a small table for each elevation of the viewer.
 
 For a viewer at elevation θ_o, half vectors whose light lies above the horizon fill 0 ≤ θ_h ≤ θ_max(φ_h, θ_o), where φ_h
-is the azimuth from the viewer's. A unit square is stretched over them: one side is |φ_h| / π, the other
+is the azimuth from the viewer's. A unit square is stretched over them. One side is s, with
 
-    s = log(1 + tan² θ_h / w²) / log(1 + tan² θ_max / w²),
+    sin θ_h = s⁴ sin θ_max,
 
-linear in solid angle within a highlight of width w and logarithmic in its tail, so that a row of cells costs about as much
-light as the next one whether the material is chrome or chalk. Every cell of that square holds the probability that the
-table gives it and is drawn from uniformly; nothing is drawn below the horizon, and nothing above it is left out. Between
-two elevations of the table, their densities are mixed: one of the two is chosen at random.
+so that a row of cells costs about as much light as the next whether the material is chrome or chalk. The other is the
+place c of φ_h on the rim of a diamond, |x| + |y| = 1 with x = 1 - c, which needs no trigonometry. Every cell of that
+square has the probability that the table gives it and is drawn from uniformly; nothing is drawn below the horizon, and
+nothing above it is left out. Between two elevations of the table their densities are mixed: one of the two is chosen at
+random, then a cell by Walker's alias method.
 
 Tables of directions for each elevation go back to Matusik (2003), half vectors from tabulated distributions to Dupuy et
 al. (2015), the domain that follows the horizon to the visible normals of Dupuy and Jakob (2018).
@@ -20,129 +21,197 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from ..arrays import Array, Triple, ops
 from ..brdf import Brdf, Buffers
-from .sampler import PI, Sampler
+from .sampler import Sampler
 
-ROWS, COLUMNS = 20, 8  # cells in s and in φ_h
+ROWS, COLUMNS = 20, 8  # cells in s and, on one side of the plane of the viewer, in c
 ELEVATIONS = 12  # of the viewer; dense at grazing angles, where lobes change fastest
 CELLS = ROWS * COLUMNS
 SLOTS = 256  # of a cell in the alias table
+SLOT_BITS = 8
 WHOLE = CELLS * SLOTS  # the probability 1
 
-WIDTHS = 2.0 ** -np.arange(10)  # w to choose from, in tan θ_h
-LOWEST = 8e-4  # cos θ_o that stands for 0, at which θ_max has no width left
+TINY = 1e-9  # added to lengths along x, so that the azimuth of the normal itself is defined
+LOWEST = 1e-4  # cos θ_o of the table's lowest elevation, 0 but for numbers that need some width
 DIFFUSE = 0.03  # share of directions that follow the cosine
-NEIGHBOUR = 0.15  # a cell gets at least that share of the brightest light in or beside it
-ENERGY_ERROR = 0.1  # of a width whose cells still see the whole highlight
+FINER = 3  # places looked at along each side of a cell
+NEIGHBOUR = 0.07  # a cell gets at least that share of the brightest light in and about it, which bounds weights
 
 
 @dataclass(frozen=True)
 class HalfVectorSampler(Sampler):
     """Half vectors from a table for each elevation of the viewer.
 
-    table: of each cell, in 32 bits from the lowest: its probability in units of 1 / WHOLE (16), another cell (8), and how
-        many of its own SLOTS that one takes (8); shape (ELEVATIONS, CELLS). A cell's number is column + COLUMNS · row.
-    width: w.
+    table: of each cell, in 32 bits from the lowest: its probability in units of 1 / WHOLE (16), another cell (8), and
+        how many of its own SLOTS that one takes (8); shape (ELEVATIONS, CELLS). A cell's number is
+        column + COLUMNS · row.
     """
 
     brdf: Brdf
     table: NDArray[np.uint32]
-    width: float
     name = "half-vector"
 
     @classmethod
     def fitted(cls, brdf: Brdf) -> HalfVectorSampler:
-        """The sampler of a BRDF, which is evaluated for about 70,000 pairs of directions."""
-        width = _width(brdf)
-        return cls(brdf, np.stack([_alias_table(p) for p in _probabilities(brdf, width)]), width)
+        """The sampler of a BRDF, which is evaluated for about 33,000 pairs of directions."""
+        return cls(brdf, np.stack([_alias_table(p) for p in _probabilities(brdf)]))
 
     def buffers(self) -> dict[str, NDArray[Any]]:
-        return {"table": self.table.reshape(-1), "width2": np.asarray(self.width**2)}
+        return {"table": self.table.reshape(-1)}
 
     def draw(self, wo: Triple, u: Triple, buffers: Buffers) -> tuple[Triple, Array]:
         f = ops(wo[0])
         table = buffers["table"]
-        node, t = _elevation(wo[2])
+        first, t = _elevation(wo[2])
         second = u[0] < t
         again = f.where(second, u[0], u[0] - t) / f.where(second, t, 1.0 - t)
-        first = CELLS * f.where(second, node + 1, node)
         slot = f.to_index(f.minimum(again * WHOLE, WHOLE - 1.0))
-        cell = slot // SLOTS
-        word = f.gather(table, first + cell)
-        cell = f.where(slot % SLOTS < (word >> 24), (word >> 16) & 255, cell)
-        row = cell // COLUMNS
-        s = (1.0 * row + u[1]) * (1.0 / ROWS)
-        turn = (1.0 * (cell % COLUMNS) + u[2]) * (2.0 / COLUMNS)
-        wi, solid_angle = _mirrored(s, turn, wo, buffers["width2"])
+        cell = slot >> SLOT_BITS
+        word = f.gather(table, cell + f.where(second, first + CELLS, first))
+        cell = f.where((slot & (SLOTS - 1)) < (word >> 24), (word >> 16) & 255, cell)
+        side = 2.0 * u[2] - 1.0
+        s = ((cell // COLUMNS) + u[1]) * (1.0 / ROWS)
+        c = ((cell % COLUMNS) + abs(side)) * (2.0 / COLUMNS)
+        wi, solid_angle = _mirrored(s, c, side, wo)
         drawn = (wo[2] > 0.0) & (wi[2] > 0.0)
-        return wi, f.where(drawn, _share(table, node, t, cell) / solid_angle, 0.0)
-def _light(brdf: Brdf, cos_o: NDArray[np.float64], width: float, finer: int) -> tuple[NDArray[np.float64], ...]:
-    """Squared light, and cosine, at places in the unit square: f_r² cos² θ_i dω_i², the mean over channels, and
-    cos θ_i dω_i; of shape (elevations, ROWS, COLUMNS, places in each cell)."""
-    places = [((np.arange(finer * n) + 0.5) / (finer * n)) for n in (ROWS, COLUMNS)]
-    z, s, phi = np.broadcast_arrays(cos_o[:, None, None], places[0][:, None], PI * places[1])
-    wo = np.sqrt(1 - z * z), np.zeros_like(z), z
-    wi, solid_angle = _mirrored(s, phi, wo, np.asarray(width**2))
-    f_r = brdf.eval(np.stack(wi, axis=-1), np.stack(wo, axis=-1))
-    cosine = np.maximum(wi[2], 0.0) * solid_angle
-    cells = (len(cos_o), ROWS, finer, COLUMNS, finer)
+        return wi, f.where(drawn, _share(table, first, t, cell) / solid_angle, 0.0)
 
-    def of_cells(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return values.reshape(cells).swapaxes(2, 3).reshape(len(cos_o), ROWS, COLUMNS, -1)
+    def density(self, wi: Triple, wo: Triple, buffers: Buffers) -> Array:
+        f = ops(wi[0])
+        above = (wi[2] > 0.0) & (wo[2] > 0.0)
+        # The half vector, and the viewer, whose lengths in the plane of the surface need not be known.
+        hx, hy, hz = (wi[0] + wo[0]) + TINY, wi[1] + wo[1], f.where(above, wi[2] + wo[2], 1.0)
+        x, y, z = wo[0] + TINY, wo[1], f.maximum(wo[2], LOWEST)
+        along, across = hx * x + hy * y, hx * y - hy * x
+        flat = hx * hx + hy * hy
+        over = _inverse_extent(along, z * z * flat)
+        s = f.sqrt(f.sqrt(f.sqrt(f.minimum(flat * over[0] / ((flat + hz * hz) * over[1]), 1.0))))
+        rim = 1.0 / (abs(along) + abs(across))
+        c = 1.0 - along * rim
+        row = f.to_index(f.minimum(s * ROWS, ROWS - 1.0))
+        column = f.to_index(f.minimum(c * (COLUMNS / 2), COLUMNS - 1.0))
+        first, t = _elevation(wo[2])
+        share = _share(buffers["table"], first, t, column + COLUMNS * row)
+        # As in `_mirrored`, with the lengths that cancel left out.
+        pdf = share * (s * hz) * ((x * x + y * y) * (rim * rim) * (1.0 / 32))
+        return f.where(above, pdf, 0.0)
 
-    return of_cells((f_r * f_r).mean(axis=-1) * cosine * cosine), of_cells(cosine)
+
+def _elevation(cos_o: Array) -> tuple[Array, Array]:
+    """Of two neighbouring elevations of the table, where the first one's cells begin, and the second one's share."""
+    f = ops(cos_o)
+    x = f.sqrt(f.maximum(cos_o, 0.0)) * (ELEVATIONS - 1)
+    node = f.to_index(f.minimum(x, ELEVATIONS - 2.0))
+    return CELLS * node, x - node
 
 
-def _width(brdf: Brdf) -> float:
-    """The width whose cells vary least within, of those that see the whole highlight.
+def _share(table: Any, first: Array, t: Array, cell: Array) -> Array:
+    """The density in a cell of the unit square."""
+    gather = ops(t).gather
+    here, next_ = (1.0 * (gather(table, first + offset + cell) & 0xFFFF) for offset in (0, CELLS))
+    return (here + t * (next_ - here)) * (1.0 / SLOTS)
 
-    Of a variable that is drawn uniformly within cells, the least second moment is (Σ √mean square)², for the
-    probabilities √mean square.
+
+def _inverse_extent(along: Array, upright2: Array) -> tuple[Array, Array]:
+    """1 / sin² θ_max, as numerator and denominator, of half vectors in a plane through the normal.
+
+    In that plane the viewer's direction has the components `along` the surface and `upright`, whose square is given, in
+    any one unit: at the angle δ = atan2(along, upright) from the normal. Light is on the horizon where
+    2 θ_h - δ = π/2, so that sin² θ_max = (1 + sin δ) / 2.
     """
-    cos_o = (np.array([1, 4, 9]) / (ELEVATIONS - 1)) ** 2
-    energies, moments = [], []
-    for width in WIDTHS:
-        square, _ = _light(brdf, cos_o, float(width), 2)
-        energies.append(np.sqrt(square).mean(axis=-1).sum(axis=(1, 2)))
-        moments.append(np.sqrt(square.mean(axis=-1)).sum(axis=(1, 2)))
-    energy, moment = np.array(energies), np.array(moments)
-    # Wide cells may step over a narrow highlight, or count it many times.
-    whole = np.median(energy[len(WIDTHS) // 2 :], axis=0)
-    if not whole.all():  # black, or nearly
-        return float(WIDTHS[0])
-    sees = (np.abs(energy / whole - 1) <= ENERGY_ERROR).all(axis=1)
-    variance = np.where(sees, ((moment / energy) ** 2).mean(axis=1), np.inf)
-    return float(WIDTHS[np.argmin(variance)])
+    f = ops(along)
+    r = f.sqrt(along * along + upright2)
+    a = r + abs(along)
+    return 2.0 * r * a, f.where(along < 0.0, upright2, a * a)
 
 
-def _probabilities(brdf: Brdf, width: float) -> NDArray[np.float64]:
-    """Of every cell, (ELEVATIONS, CELLS), each row with the sum 1."""
+def _mirrored(s: Array, c: Array, side: Array, wo: Triple) -> tuple[Triple, Array]:
+    """The direction to the light at a place of the unit square, and the solid angle of the whole square at its scale.
+
+    side: its sign tells the side of the plane of the viewer.
+    dω_i = 4 (h·ω_o) dω_h, dω_h = d(sin² θ_h) dφ_h / (2 cos θ_h), dφ_h = dc / (x² + y²).
+    """
+    f = ops(s)
+    x = 1.0 - c
+    y = 1.0 - abs(x)
+    y = f.where(side < 0.0, -y, y)
+    round_ = x * x + y * y
+    wx, wy, wz = wo[0] + TINY, wo[1], f.maximum(wo[2], LOWEST)
+    across = wx * wx + wy * wy
+    scale = 1.0 / f.sqrt(round_ * across)
+    tilt = x * across * scale
+    over = _inverse_extent(tilt, wz * wz)
+    extent = over[1] / over[0]
+    s2 = s * s
+    s6 = s2 * s2 * s2
+    sin2 = s6 * s2 * extent
+    sin, cos = f.sqrt(sin2), f.sqrt(1.0 - sin2)
+    dot = sin * tilt + cos * wz
+    planar = 2.0 * dot * sin * scale
+    wi = planar * (x * wx - y * wy) - wx, planar * (x * wy + y * wx) - wy, 2.0 * dot * cos - wz
+    return wi, 64.0 * (s6 * s) * extent * dot / (cos * round_)
+
+
+def _light(brdf: Brdf, cos_o: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The light f_r cos θ_i dω_i of places in the unit square, FINER² in each cell, and cos θ_i dω_i alone; of shape
+    (elevations, ROWS, COLUMNS, places, channels) and without channels."""
+    s, c = (((np.arange(FINER * n) + 0.5) / (FINER * n)) for n in (ROWS, COLUMNS))
+    z, s, c = np.broadcast_arrays(cos_o[:, None, None], s[:, None], 2 * c)
+    wo = np.sqrt(1 - z * z), np.zeros_like(z), z
+    wi, solid_angle = _mirrored(s, c, np.ones_like(c), wo)
+    cosine = np.maximum(wi[2], 0.0) * solid_angle
+    light = brdf.eval(np.stack(wi, axis=-1), np.stack(wo, axis=-1)) * cosine[..., None]
+
+    def of_cells(values: NDArray[np.float64], *channels: int) -> NDArray[np.float64]:
+        grouped = values.reshape(len(cos_o), ROWS, FINER, COLUMNS, FINER, *channels).swapaxes(2, 3)
+        return grouped.reshape(len(cos_o), ROWS, COLUMNS, FINER**2, *channels)
+
+    return of_cells(light, 3), of_cells(cosine)
+
+
+def _probabilities(brdf: Brdf) -> NDArray[np.float64]:
+    """Of every cell, (ELEVATIONS, CELLS), each row with the sum 1.
+
+    A cell's root mean square of light makes the variance of the albedo least; what it gets beyond that bounds weights.
+    """
     # Each table serves the elevations about it, so that those between are looked at, too.
-    cos_o = np.maximum((np.arange(2 * ELEVATIONS - 1) / (2 * ELEVATIONS - 2)) ** 2, LOWEST)
-    square, cosine = _light(brdf, cos_o, width, 3)
-    mean = square.mean(axis=-1)
-    total = np.sqrt(mean).sum(axis=(1, 2), keepdims=True)
-    unit = np.where(total > 0, total, 1.0)
-    mean, brightest = mean / unit**2, np.sqrt(square.max(axis=-1)) / unit
-    before, after = np.r_[1, 1 : 2 * ELEVATIONS - 2 : 2], np.r_[1 : 2 * ELEVATIONS - 2 : 2, 2 * ELEVATIONS - 3]
-    near = np.maximum(brightest[::2], np.maximum(brightest[before], brightest[after]))
-    light = np.maximum(np.sqrt(mean[::2]), NEIGHBOUR * _brightest_neighbour(near))
-    diffuse = cosine[::2].mean(axis=-1)
-    shares = [part / part.sum(axis=(1, 2), keepdims=True) for part in (light, diffuse) if part.any()]
-    p = (1 - DIFFUSE) * shares[0] + DIFFUSE * shares[-1]
-    return p.reshape(ELEVATIONS, CELLS)
+    between = 2 * ELEVATIONS - 1
+    light, cosine = _light(brdf, np.maximum((np.arange(between) / (between - 1)) ** 2, LOWEST))
+    rms = np.sqrt((light * light).mean(axis=(-2, -1)))
+    rms /= _positive(rms.sum(axis=(1, 2), keepdims=True))
+    albedo = light.mean(axis=-2, keepdims=True).sum(axis=(1, 2), keepdims=True)
+    brightest = (light / _positive(albedo)).max(axis=(-2, -1))
+    padded = np.pad(brightest, ((2, 2), (1, 1), (1, 1)), "edge")
+    near = sliding_window_view(padded, (5, 3, 3)).max(axis=(-3, -2, -1))
+    parts = np.maximum(rms, NEIGHBOUR * near)[::2], cosine[::2].mean(axis=-1)
+    shares = [part / part.sum(axis=(1, 2), keepdims=True) for part in parts if part.any()]
+    return ((1 - DIFFUSE) * shares[0] + DIFFUSE * shares[-1]).reshape(ELEVATIONS, CELLS)
 
 
-def _brightest_neighbour(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The largest value in or beside a cell, along each axis and diagonally."""
-    for axis in range(values.ndim):
-        ahead, behind = (np.roll(values, step, axis) for step in (1, -1))
-        for moved, end in ((ahead, 0), (behind, -1)):  # the ends are no neighbours
-            edge = [slice(None)] * values.ndim
-            edge[axis] = slice(end, None if end else 1)
-            moved[tuple(edge)] = values[tuple(edge)]
-        values = np.maximum(values, np.maximum(ahead, behind))
-    return values
+def _positive(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Divisors, 1 where there is no light."""
+    return np.where(values > 0, values, 1.0)
+
+
+def _alias_table(p: NDArray[np.float64]) -> NDArray[np.uint32]:
+    """The words of one elevation, (CELLS): see `HalfVectorSampler.table`. Every cell has at least 1 / WHOLE.
+
+    Vose's construction, in whole slots: what is drawn is exactly what the words say.
+    """
+    exact = p * (WHOLE - CELLS)
+    units = 1 + np.floor(exact).astype(np.int64)
+    rest = WHOLE - int(units.sum())
+    units[np.argsort(np.floor(exact) - exact, kind="stable")[:rest]] += 1
+    other, taken, left = np.zeros(CELLS, np.int64), np.zeros(CELLS, np.int64), units.copy()
+    small, large = ([int(i) for i in np.flatnonzero(which)] for which in (units < SLOTS, units >= SLOTS))
+    while small:
+        poor, rich = small.pop(), large[-1]
+        other[poor], taken[poor] = rich, SLOTS - left[poor]
+        left[rich] -= taken[poor]
+        if left[rich] < SLOTS:
+            small.append(large.pop())
+    return (units | other << 16 | taken << 24).astype(np.uint32)

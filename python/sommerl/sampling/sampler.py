@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,8 +20,13 @@ class Sampler(ABC):
     brdf: the one whose light it follows, and whose light `sample` weighs.
     """
 
-    name: str  #: by which `SAMPLERS` knows it
+    name: str  #: as users write it: see `named`
     brdf: Brdf
+
+    @classmethod
+    @abstractmethod
+    def fitted(cls, brdf: Brdf) -> Self:
+        """The sampler for a BRDF."""
 
     def buffers(self) -> dict[str, NDArray[Any]]:
         """The NumPy arrays that the formulas read, by name; one of shape () is a number.
