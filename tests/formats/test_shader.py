@@ -3,72 +3,12 @@ import subprocess
 
 import numpy as np
 import pytest
-from helpers import compact_material, must_fail, random_directions, tool
+from helpers import compact_material, must_fail, tool
+from shader_programs import CASES, COMPACT, A, B, compact, material, run, validate
 
-from sommerl import BrdfTable, Lattice, SomManBrdf, TrainOptions, builtin, train
+from sommerl import BrdfTable, Lattice, SomManBrdf, builtin
 from sommerl.errors import FormatError
 from sommerl.formats import shader
-from sommerl.nodes import FINE, NodeLattice
-
-A, B = random_directions(10_000, 1), random_directions(10_000, 2)
-A[:5], B[:5] = A[:5] * [1, 1, -1], B[:5]  # below the horizon
-A[5], B[5:7], A[6] = [0.6, 0, 0.8], [-0.6, 0, 0.8], [0, 0, 1]  # mirror directions
-MAIN = """
-#include "x.h"
-#include <cstdio>
-typedef SOMMERL_REAL real;
-int main() {
-    double a[6];
-    while (std::fread(a, sizeof(double), 6, stdin) == 6) {
-        const material_x::real3 wi{real(a[0]), real(a[1]), real(a[2])}, wo{real(a[3]), real(a[4]), real(a[5])};
-        const material_x::real3 f = material_x::eval(wi, wo);
-        const double out[3] = {double(f.x), double(f.y), double(f.z)};
-        std::fwrite(out, sizeof(double), 3, stdout);
-    }
-}
-"""
-
-
-def material(lattice, clusters, interpolation):
-    table = BrdfTable.sample(builtin("purple-paint"), lattice)
-    return train(table, TrainOptions(clusters=clusters, epochs=2))[0].with_interpolation(interpolation)
-
-
-CASES = [
-    (Lattice(30, 30, 60), 200, "nearest"),
-    (Lattice(30, 30, 60), 300, "nearest"),  # two bytes an index
-    (Lattice(30, 30, 60), 300, "trilinear"),
-    (Lattice(9, 7, 11), 60, "trilinear"),  # a number of cells that does not fill the last word
-    (Lattice(12, 10, 30, reciprocal=False), 60, "trilinear"),
-    (Lattice(12, 10, 30, reciprocal=False), 60, "nearest"),
-    (Lattice(1, 1, 1), 1, "trilinear"),
-]
-
-BANDS = [tuple(sorted({0, FINE, *range(b + 1, FINE, 7 * b + 9)})) for b in range(3)]
-ROWS = tuple(range(0, FINE + 1, 4))
-COMPACT = {
-    "several bands": (
-        NodeLattice((0, 1, 5, 88, 92, 120, 180), (0, 0, 1, 1, 2, 2, 2), tuple(BANDS), tuple(b[:-1] for b in BANDS)),
-        (20, 15),
-    ),
-    "one node in phi_d": (NodeLattice((0, 40, 90, 180), (0,) * 4, ((0, 60, 180),), ((0,),)), (7, 5)),
-    "one gain and one shape": (NodeLattice((0, 180), (0, 1), ((0, 180),) * 2, ((0,), (0, 90, 179))), (1, 1)),
-    "finest": (NodeLattice((0, 180), (0, 0), (tuple(range(FINE + 1)),), (tuple(range(FINE)),)), (300, 300)),
-    "big": (NodeLattice(ROWS, (0,) * 20 + (1,) * 26, (BANDS[0], ROWS), (ROWS[:-1], BANDS[2][:-1])), (256, 256)),
-}
-
-
-def compact(case):
-    lattice, palette = COMPACT[case]
-    return compact_material(lattice, *palette)
-
-
-def run(folder, real):
-    (folder / "main.cpp").write_text(MAIN)
-    options = ["-std=c++11", "-Wall", "-Wextra", "-Werror", f"-DSOMMERL_REAL={real}", "-o", "main"]
-    subprocess.run([tool("g++"), *options, "main.cpp"], cwd=folder, check=True)
-    done = subprocess.run(folder / "main", input=np.concatenate([A, B], 1).tobytes(), capture_output=True, check=True)
-    return np.frombuffer(done.stdout).reshape(-1, 3)
 
 
 def check_like_python(brdf, found):
@@ -116,8 +56,8 @@ def test_compact_materials_in_single_precision(tmp_path, case):
 
 
 def check_small(path, brdf):
-    """Functions, palette and lattice, and half a word of 13 letters a node."""
-    assert path.stat().st_size < 45_000 + 6.5 * brdf.lattice.size
+    """Functions, palette, lattice and sampler, and half a word of 13 letters a node."""
+    assert path.stat().st_size < 70_000 + 6.5 * brdf.lattice.size
 
 
 def test_a_compact_material_is_small(tmp_path):
@@ -165,31 +105,30 @@ def test_headers_of_both_kinds_in_one_program(tmp_path):
 
 
 GLSL = """#version 450
-#extension GL_GOOGLE_include_directive : enable
 #include "x.glsl"
 #include "y.glsl"
-layout(location = 0) in vec3 wi;
-layout(location = 1) in vec3 wo;
+layout(location = 0) in vec3 wo;
+layout(location = 1) in vec3 u;
 layout(location = 0) out vec4 color;
-void main() { color = vec4(material_x_eval(wi, wo) + material_y_eval(wi, wo), 1.0); }
+void main() {
+    float pdf;
+    vec3 wi = material_x_sample(wo, u, pdf);
+    color = vec4(material_x_eval(wi, wo) + material_y_eval(wi, wo), pdf + material_y_pdf(wi, wo));
+}
 """
 HLSL = """#include "x.hlsl"
 #include "y.hlsl"
-float4 main(float3 wi : A, float3 wo : B) : SV_Target {
-    return float4(material_x_eval(wi, wo) + material_y_eval(wi, wo), 1.0);
+float4 main(float3 wo : A, float3 u : B) : SV_Target {
+    float pdf;
+    float3 wi = material_x_sample(wo, u, pdf);
+    return float4(material_x_eval(wi, wo) + material_y_eval(wi, wo), pdf + material_y_pdf(wi, wo));
 }
 """
 
 
-def validate(folder, text, *options):
-    (folder / "main.frag").write_text(text)
-    command = [tool("glslangValidator"), "-V", *options, "main.frag", "-o", "out.spv"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout
-
-
 SHADERS = pytest.mark.parametrize(
-    ("extension", "text", "options"), [("glsl", GLSL, ()), ("hlsl", HLSL, ("-D", "-S", "frag", "-e", "main"))]
+    ("extension", "text", "options"),
+    [("glsl", GLSL, ("-V",)), ("hlsl", HLSL, ("-V", "-D", "-S", "frag", "-e", "main"))],
 )
 
 
@@ -215,27 +154,39 @@ def test_shaders_of_compact_materials_compile(tmp_path, case, extension, text, o
     check_shaders_compile(tmp_path, compact(case), material(*CASES[3]), extension, text, options)
 
 
+WEBGL = re.sub(r"layout\(.*\) ", "", GLSL).replace("450", "300 es\nprecision highp float;\nprecision highp int;")
+
+
+def test_shaders_compile_for_web_pages(tmp_path):
+    x, y = compact("one node in phi_d"), material(*CASES[3])
+    check_shaders_compile(tmp_path, x, y, "glsl", WEBGL, ())
+
+
 BUFFERS = """#version 450
-#extension GL_GOOGLE_include_directive : enable
 layout(std430, binding = 0) readonly buffer Words { uint words[]; };
 layout(std430, binding = 1) readonly buffer Palette { float palette[]; };
 layout(std430, binding = 2) readonly buffer Gains { float gains[]; };
 layout(std430, binding = 3) readonly buffer Nodes { uint nodes[]; };
+layout(std430, binding = 4) readonly buffer Sampler { uint cells[]; };
 #define SOMMERL_WORD(i) words[i]
 #define SOMMERL_LUT(i) palette[i]
 #define SOMMERL_GAIN(i) gains[i]
 #define SOMMERL_LATTICE(i) nodes[i]
+#define SOMMERL_SAMPLER(i) cells[i]
 #include "x.glsl"
 layout(location = 0) out vec4 color;
-void main() { color = vec4(material_x_eval(vec3(0.0, 0.0, 1.0), vec3(0.0, 0.0, 1.0)), 1.0); }
+void main() {
+    vec3 n = vec3(0.0, 0.0, 1.0);
+    color = vec4(material_x_eval(n, n), material_x_pdf(n, n));
+}
 """
 
 
 @pytest.mark.parametrize("made", [lambda: material(*CASES[3]), lambda: compact("several bands")])
 def test_arrays_can_live_elsewhere(tmp_path, made):
     shader.write(made(), tmp_path / "x.glsl")
-    validate(tmp_path, BUFFERS)
-    must_fail(validate, tmp_path, BUFFERS.replace("uint words[]", "float words[]"))
+    validate(tmp_path, BUFFERS, "-V")
+    must_fail(validate, tmp_path, BUFFERS.replace("uint words[]", "float words[]"), "-V")
 
 
 def check_leaves_no_macro(text):

@@ -1,4 +1,5 @@
-"""Materials as source code: a C++ header, GLSL or HLSL, with palette, packed indices and an `eval`, and nothing else.
+"""Materials as source code: a C++ header, GLSL or HLSL, with palette, packed indices, a sampler's table, and the
+functions `eval`, `sample` and `pdf`.
 
 One text serves the three languages; they differ in a few lines before it and in how an array is written.
 """
@@ -20,11 +21,13 @@ from ..errors import FormatError
 from ..files import atomic_write
 from ..lattice import Lattice
 from ..nodes import ABOVE, BELOW, FINE, HALF_PI, KNEE, SMALLEST_COSINE
+from ..sampling import half_vector
 from . import shader_text as text
 from .shader_text import CPP, GLSL, HLSL, Language
 
 LANGUAGES = {".h": CPP, ".hpp": CPP, ".glsl": GLSL, ".hlsl": HLSL}
 A_LINE = 10  # numbers
+OF_SAMPLER = ("ROWS", "COLUMNS", "ELEVATIONS", "CELLS", "SLOTS", "SLOT_BITS", "WHOLE", "TINY", "LOWEST")
 
 
 @dataclass(frozen=True)
@@ -75,17 +78,22 @@ def source(material: OnLattice, language: Language, name: str) -> str:
         parts = _cells(material.grid, material.interpolation, index, lut)
     else:
         parts = _nodes(material.buffers(), lut)
-    macros = [array.macro for array in parts.arrays]
-    functions = text.ENTRY + parts.functions + text.EVAL.replace("@FOLD@", parts.fold).replace("@LOOKUP@", parts.lookup)
-    undefined = "".join(f"#undef {macro}\n" for macro in ("SOMMERL_FUNCTION", *macros))  # for the next material's file
+    table = half_vector.HalfVectorSampler.fitted(material).table
+    arrays = [*parts.arrays, _words("SOMMERL_SAMPLER", "sampler", table.reshape(-1))]
+    macros = [array.macro for array in arrays]
+    evaluation = text.EVAL.replace("@FOLD@", parts.fold).replace("@LOOKUP@", parts.lookup)
+    functions = text.ENTRY + parts.functions + evaluation + text.SAMPLING
+    for_the_next_file = ("SOMMERL_FUNCTION", "SOMMERL_OUT", *macros)
+    undefined = "".join(f"#undef {macro}\n" for macro in for_the_next_file)
     whole = text.HEAD.replace("@CONTENTS@", parts.contents) + language.before + "\n"
-    whole += "\n".join(_guarded(array, language) for array in parts.arrays) + functions + language.after + undefined
+    whole += "\n".join(_guarded(array, language) for array in arrays) + functions + language.after + undefined
     title = re.sub(r"\s+", " ", "".join(c if c.isprintable() and c != "\\" else " " for c in material.name))
-    values = parts.values | {
+    values = parts.values | {constant: repr(getattr(half_vector, constant)) for constant in OF_SAMPLER}
+    values |= {
         "TITLE": title,
         "SHA": material.source_sha256 or "unknown",
         "NAME": name,
-        "CALL": f"{name}::eval(wi, wo)" if language is CPP else f"{name}_eval(wi, wo)",
+        "CALL": f"{name}::" if language is CPP else f"{name}_",
         "MACROS": " and ".join((", ".join(f"{macro}(i)" for macro in macros[:-1]), f"{macros[-1]}(i)")),
         "SHARE_THETA": repr(2 / np.pi),
     }
@@ -126,7 +134,7 @@ def _nodes(buffers: Mapping[str, NDArray[Any]], lut: NDArray[np.float64]) -> _Pa
         "SHAPE_BITS": str(shape_bits),
         "SHAPE_MASK": str(2**shape_bits - 1),
         "FINE": str(FINE),
-        "ROWS": str(len(lattice) - 2 * len(buffers["base"])),
+        "FIRST_ROW": str(len(lattice) - 2 * len(buffers["base"])),
         "KNEE": str(KNEE),
         "KNEE_AT": repr(KNEE / BELOW),
         "BELOW": str(BELOW),

@@ -39,10 +39,14 @@ inline real max(real a, real b) { return a > b ? a : b; }
 inline real atan2(real y, real x) { return std::atan2(y, x); }
 inline real sqrt(real x) { return std::sqrt(x); }
 inline real floor(real x) { return std::floor(x); }
+inline real abs(real x) { return std::fabs(x); }
 #define SOMMERL_FUNCTION inline
+#define SOMMERL_OUT(type) type&
 """,
     after="""
 inline real3 eval(real3 wi, real3 wo) { return @NAME@_eval(wi, wo); }
+inline real3 sample(real3 wo, real3 u, real& pdf) { return @NAME@_sample(wo, u, pdf); }
+inline real pdf(real3 wi, real3 wo) { return @NAME@_pdf(wi, wo); }
 
 }  // namespace @NAME@
 """,
@@ -54,6 +58,7 @@ GLSL = Language(
 #define real3 vec3
 #define atan2 atan
 #define SOMMERL_FUNCTION
+#define SOMMERL_OUT(type) out type
 """,
     after="#undef real\n#undef real3\n#undef atan2\n",
     array="const {type} {name}[{size}] = {type}[{size}](\n{values}\n);",
@@ -63,6 +68,7 @@ HLSL = Language(
 #define real float
 #define real3 float3
 #define SOMMERL_FUNCTION
+#define SOMMERL_OUT(type) out type
 """,
     after="#undef real\n#undef real3\n",
     array="static const {type} {name}[{size}] = {{\n{values}\n}};",
@@ -73,8 +79,11 @@ HEAD = """\
 // Written by Sommerl: @CONTENTS@
 // Source: @SHA@
 //
-// @CALL@: f_r [1/sr], linear RGB, without the cosine. wi points to the light, wo to the viewer: unit
+// @CALL@eval(wi, wo): f_r [1/sr], linear RGB, without the cosine. wi points to the light, wo to the viewer: unit
 // vectors in the surface's frame, z along the normal. 0 below the horizon.
+// @CALL@sample(wo, u, pdf): a direction wi about as f_r times cosine is distributed, from three uniform random
+// numbers u in [0, 1). It sets pdf to the density [1/sr] of wi: 0 if nothing was drawn.
+// @CALL@pdf(wi, wo): the density [1/sr] of drawing wi for wo. 0 below the horizon.
 //
 // The arrays can live in buffers of your own: before this file, define
 // @MACROS@.
@@ -91,6 +100,9 @@ ENTRY = """
 SOMMERL_FUNCTION uint @NAME@_entry(uint i) {
     return (SOMMERL_WORD(i / @PER_WORD@u) >> (@BITS@u * (i % @PER_WORD@u))) & @MASK@u;
 }
+
+// The whole part of x, at least 0 and at most `last`, whatever x is.
+SOMMERL_FUNCTION uint @NAME@_bin(real x, real last) { return uint(min(max(x, real(0)), last)); }
 """
 
 EVAL = """
@@ -113,6 +125,100 @@ RECIPROCAL = """\
 NOT_RECIPROCAL = """\
     real phi_d = atan2(y, x);
     if (phi_d < real(0)) phi_d = phi_d + real(6.283185307179586);"""
+
+SAMPLING = """
+// The sampler: Sommerl's sampling/half_vector.py, with the same names. A unit square is stretched over the half vectors
+// whose light is above the horizon: one side is s, with sin(theta_h) = s^4 sin(theta_max), the other c, the place of
+// phi_h on the rim of a diamond. SOMMERL_SAMPLER holds @ROWS@ x @COLUMNS@ cells of that square for each of @ELEVATIONS@
+// elevations of the viewer; of a cell, from the lowest bits, its probability in units of 1/@WHOLE@ (16 bits), another
+// cell (8), and how many of its own @SLOTS@ slots that one takes (8).
+
+// Of two neighbouring elevations, where the first one's cells begin, and in t the second one's share.
+SOMMERL_FUNCTION uint @NAME@_elevation(real cos_o, SOMMERL_OUT(real) t) {
+    real x = sqrt(cos_o) * real(@ELEVATIONS@ - 1);
+    uint node = @NAME@_bin(x, real(@ELEVATIONS@ - 2));
+    t = x - real(node);
+    return @CELLS@u * node;
+}
+
+// The density in a cell of the unit square.
+SOMMERL_FUNCTION real @NAME@_share(uint first, real t, uint cell) {
+    real here = real(SOMMERL_SAMPLER(first + cell) & 65535u);
+    real next = real(SOMMERL_SAMPLER(first + @CELLS@u + cell) & 65535u);
+    return (here + t * (next - here)) / real(@SLOTS@);
+}
+
+// sin^2 theta_max of half vectors in a plane through the normal, in which the viewer's direction has the components
+// `along` the surface and `upright`, whose square is given, in any one unit.
+SOMMERL_FUNCTION real @NAME@_extent(real along, real upright2) {
+    real r = sqrt(along * along + upright2);
+    real a = r + abs(along);
+    return (along < real(0) ? upright2 : a * a) / (real(2) * r * a);
+}
+
+// The direction to the light at a place of the unit square, and the solid angle of the whole square at its scale.
+SOMMERL_FUNCTION real3 @NAME@_mirrored(real s, real c, real side, real3 wo, SOMMERL_OUT(real) solid_angle) {
+    real x = real(1) - c;
+    real y = real(1) - abs(x);
+    y = side < real(0) ? -y : y;
+    real round_ = x * x + y * y;
+    real wx = wo.x + real(@TINY@), wy = wo.y, wz = max(wo.z, real(@LOWEST@));
+    real across = wx * wx + wy * wy;
+    real scale = real(1) / sqrt(round_ * across);
+    real tilt = x * across * scale;
+    real extent = @NAME@_extent(tilt, wz * wz);
+    real s2 = s * s;
+    real s6 = s2 * s2 * s2;
+    real sin2 = s6 * s2 * extent;
+    real sin = sqrt(sin2), cos = sqrt(max(real(1) - sin2, real(0)));
+    real dot = sin * tilt + cos * wz;
+    real planar = real(2) * dot * sin * scale;
+    solid_angle = real(64) * (s6 * s) * extent * dot / (cos * round_);
+    return real3(planar * (x * wx - y * wy) - wx, planar * (x * wy + y * wx) - wy, real(2) * dot * cos - wz);
+}
+
+SOMMERL_FUNCTION real3 @NAME@_sample(real3 wo, real3 u, SOMMERL_OUT(real) pdf) {
+    pdf = real(0);
+    if (!(wo.z > real(0))) return real3(real(0), real(0), real(1));
+    real t;
+    uint first = @NAME@_elevation(wo.z, t);
+    bool second = u.x < t;
+    real again = second ? u.x / t : (u.x - t) / (real(1) - t);
+    uint slot = @NAME@_bin(again * real(@WHOLE@), real(@WHOLE@ - 1));
+    uint cell = slot >> @SLOT_BITS@u;
+    uint word = SOMMERL_SAMPLER(cell + (second ? first + @CELLS@u : first));
+    if ((slot & (@SLOTS@u - 1u)) < (word >> 24u)) cell = (word >> 16u) & 255u;
+    real side = real(2) * u.z - real(1);
+    real s = (real(cell / @COLUMNS@u) + u.y) / real(@ROWS@);
+    real c = (real(cell % @COLUMNS@u) + abs(side)) * (real(2) / real(@COLUMNS@));
+    real solid_angle;
+    real3 wi = @NAME@_mirrored(s, c, side, wo, solid_angle);
+    // Half vectors next to the normal have densities beyond single precision, and weigh nothing.
+    if (!(wi.z > real(0) && solid_angle > real(1e-35))) return real3(real(0), real(0), real(1));
+    pdf = @NAME@_share(first, t, cell) / solid_angle;
+    return wi;
+}
+
+SOMMERL_FUNCTION real @NAME@_pdf(real3 wi, real3 wo) {
+    if (!(wi.z > real(0) && wo.z > real(0))) return real(0);
+    // The half vector, and the viewer, whose lengths in the plane of the surface need not be known.
+    real hx = (wi.x + wo.x) + real(@TINY@), hy = wi.y + wo.y, hz = wi.z + wo.z;
+    real x = wo.x + real(@TINY@), y = wo.y, z = max(wo.z, real(@LOWEST@));
+    real along = hx * x + hy * y, across = hx * y - hy * x;
+    real least = real(@TINY@) * real(@TINY@);  // in single precision, these lengths can be 0
+    real flat2 = max(hx * hx + hy * hy, least);
+    real extent = @NAME@_extent(along, z * z * flat2);
+    real s = sqrt(sqrt(sqrt(min(flat2 / ((flat2 + hz * hz) * extent), real(1)))));
+    real rim = real(1) / max(abs(along) + abs(across), least);
+    real c = real(1) - along * rim;
+    uint row = @NAME@_bin(s * real(@ROWS@), real(@ROWS@ - 1));
+    uint column = @NAME@_bin(c * (real(@COLUMNS@) / real(2)), real(@COLUMNS@ - 1));
+    real t;
+    uint first = @NAME@_elevation(wo.z, t);
+    real share = @NAME@_share(first, t, column + @COLUMNS@u * row);
+    return share * (s * hz) * ((x * x + y * y) * (rim * rim) / real(32));
+}
+"""
 
 CELLS = """
 // Cell number from the bins in (theta_h, theta_d, phi_d); the bins in phi_d wrap, the others end.
@@ -164,7 +270,7 @@ NODES = """
 // then for each band of rows the steps in theta_d and those in phi_d; then for each row the number of its first node,
 // and a word with its band (the lowest byte) and its number of nodes in phi_d.
 SOMMERL_FUNCTION uint @NAME@_step(uint axis, real place) {
-    return SOMMERL_LATTICE(axis * @FINE@u + uint(min(max(place, real(0)), real(@FINE@ - 1))));
+    return SOMMERL_LATTICE(axis * @FINE@u + @NAME@_bin(place, real(@FINE@ - 1)));
 }
 
 SOMMERL_FUNCTION real @NAME@_share(uint between, real place) {
@@ -198,7 +304,7 @@ NODES_LOOKUP = """\
     real t = @NAME@_share(rows, h);
     real3 sum = real3(real(0), real(0), real(0));
     for (uint i = 0u; i < 2u; ++i) {
-        uint row = @ROWS@u + 2u * @NAME@_number(rows, i);
+        uint row = @FIRST_ROW@u + 2u * @NAME@_number(rows, i);
         uint first = SOMMERL_LATTICE(row), band = SOMMERL_LATTICE(row + 1u);
         uint step_d = @NAME@_step(1u + 2u * (band & 255u), d), step_p = @NAME@_step(2u + 2u * (band & 255u), p);
         real u = @NAME@_share(step_d, d), w = @NAME@_share(step_p, p);

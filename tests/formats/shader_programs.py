@@ -1,0 +1,88 @@
+"""Materials as source code, compiled and run: what the tests of it share."""
+
+import re
+import subprocess
+
+import numpy as np
+from helpers import compact_material, random_directions, tool
+
+from sommerl import BrdfTable, Lattice, TrainOptions, builtin, train
+from sommerl.nodes import FINE, NodeLattice
+
+A, B = random_directions(10_000, 1), random_directions(10_000, 2)
+A[:5], B[:5] = A[:5] * [1, 1, -1], B[:5]  # below the horizon
+A[5], B[5:7], A[6] = [0.6, 0, 0.8], [-0.6, 0, 0.8], [0, 0, 1]  # mirror directions
+MAIN = """
+#include "x.h"
+#include <cstdio>
+typedef SOMMERL_REAL real;
+int main() {
+    double in[6];
+    while (std::fread(in, sizeof(double), 6, stdin) == 6) {
+        const material_x::real3 a{real(in[0]), real(in[1]), real(in[2])}, b{real(in[3]), real(in[4]), real(in[5])};
+        CALL
+        std::fwrite(out, sizeof(double), sizeof(out) / sizeof(double), stdout);
+    }
+}
+"""
+CALLS = {
+    "eval": "const auto f = material_x::eval(a, b); const double out[] = {f.x, f.y, f.z};",
+    "sample": """real pdf;
+        const auto wi = material_x::sample(a, b, pdf);
+        const double out[] = {wi.x, wi.y, wi.z, pdf, material_x::pdf(wi, a)};""",
+    "pdf": "const double out[] = {material_x::pdf(a, b)};",
+}
+
+
+def material(lattice, clusters, interpolation):
+    table = BrdfTable.sample(builtin("purple-paint"), lattice)
+    return train(table, TrainOptions(clusters=clusters, epochs=2))[0].with_interpolation(interpolation)
+
+
+CASES = [
+    (Lattice(30, 30, 60), 200, "nearest"),
+    (Lattice(30, 30, 60), 300, "nearest"),  # two bytes an index
+    (Lattice(30, 30, 60), 300, "trilinear"),
+    (Lattice(9, 7, 11), 60, "trilinear"),  # a number of cells that does not fill the last word
+    (Lattice(12, 10, 30, reciprocal=False), 60, "trilinear"),
+    (Lattice(12, 10, 30, reciprocal=False), 60, "nearest"),
+    (Lattice(1, 1, 1), 1, "trilinear"),
+]
+
+BANDS = [tuple(sorted({0, FINE, *range(b + 1, FINE, 7 * b + 9)})) for b in range(3)]
+ROWS = tuple(range(0, FINE + 1, 4))
+COMPACT = {
+    "several bands": (
+        NodeLattice((0, 1, 5, 88, 92, 120, 180), (0, 0, 1, 1, 2, 2, 2), tuple(BANDS), tuple(b[:-1] for b in BANDS)),
+        (20, 15),
+    ),
+    "one node in phi_d": (NodeLattice((0, 40, 90, 180), (0,) * 4, ((0, 60, 180),), ((0,),)), (7, 5)),
+    "one gain and one shape": (NodeLattice((0, 180), (0, 1), ((0, 180),) * 2, ((0,), (0, 90, 179))), (1, 1)),
+    "finest": (NodeLattice((0, 180), (0, 0), (tuple(range(FINE + 1)),), (tuple(range(FINE)),)), (300, 300)),
+    "big": (NodeLattice(ROWS, (0,) * 20 + (1,) * 26, (BANDS[0], ROWS), (ROWS[:-1], BANDS[2][:-1])), (256, 256)),
+}
+
+
+def compact(case):
+    lattice, palette = COMPACT[case]
+    return compact_material(lattice, *palette)
+
+
+def run(folder, real, call="eval", a=A, b=B):
+    """What the header in the folder gives for pairs of vectors, row by row. Behaviour that is undefined stops it."""
+    (folder / "main.cpp").write_text(MAIN.replace("CALL", CALLS[call]))
+    options = ["-std=c++11", "-Wall", "-Wextra", "-Werror", f"-DSOMMERL_REAL={real}", "-o", "main"]
+    defined = ["-fsanitize=undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
+    subprocess.run([tool("g++"), *options, *defined, "main.cpp"], cwd=folder, check=True)
+    done = subprocess.run(folder / "main", input=np.concatenate([a, b], 1).tobytes(), capture_output=True)
+    assert done.returncode == 0, done.stderr.decode()
+    return np.frombuffer(done.stdout).reshape(len(a), -1)
+
+
+def validate(folder, text, *options):
+    """Compiles a fragment shader that may include files of the folder, whatever the language says of that."""
+    included = re.sub(r'#include "(.+)"', lambda name: (folder / name[1]).read_text(), text)
+    (folder / "main.frag").write_text(included)
+    command = [tool("glslangValidator"), *options, "main.frag"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
