@@ -1,0 +1,159 @@
+"""A table of directions to the light for each elevation of the viewer: Matusik's sampler.
+
+Matusik 2003, "A Data-Driven Reflectance Model" (thesis, MIT), as Lawrence, Rusinkiewicz & Ramamoorthi 2004 describe it
+in their section 2; the thesis itself was not at hand. What is tabulated for an elevation is f_r cos θ_i sin θ_i over
+θ_i and φ, the mean of the channels; a marginal distribution in θ_i and a conditional one in φ for each θ_i are
+inverted. It is here to be compared with: it follows any material closely, and is as large as a measured table of one
+channel.
+
+Two things are our own. A material here is isotropic and taken to look the same from both sides of the plane of the
+viewer, so that half of the circle is stored. Within a cell, directions follow the cosine: weights are then f_r at the
+direction over f_r at the cell's centre, up to the horizon.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Array, Triple, ops
+from ..brdf import Brdf, Buffers
+from ..half_diff import spherical
+from .sampler import PI, Sampler
+
+ELEVATIONS = 90  # of the viewer, equal in θ_o; each table serves the whole of its degree, from its centre
+ROWS, COLUMNS = 90, 180  # of a table: equal in θ_i, and in φ over half of the circle
+HEIGHT, WIDTH = PI / 2 / ROWS, PI / COLUMNS  # of a cell [rad]
+# The share of each distribution that follows the cosine, so that no direction is left out. It gives every cell at least
+# 50 units in the last place of a CDF in single precision.
+FLOOR = 0.01
+UPRIGHT = 1e-20  # sin² θ_o of viewers that have no azimuth
+
+
+@dataclass(frozen=True)
+class MatusikSampler(Sampler):
+    """Directions to the light from a table for each elevation of the viewer, megabytes in all: as large as the BRDF.
+
+    rows: cumulative probabilities of θ_i's rows, (ELEVATIONS, ROWS + 1), from 0 to 1.
+    columns: those of φ's columns in each row, (ELEVATIONS, ROWS, COLUMNS + 1), from 0 to 1. φ is counted from the
+        viewer's azimuth, to either side.
+    """
+
+    brdf: Brdf
+    rows: NDArray[np.float32]
+    columns: NDArray[np.float32]
+    name = "matusik"
+
+    @classmethod
+    def fitted(cls, brdf: Brdf) -> MatusikSampler:
+        """The sampler of a BRDF, which is evaluated for 1,458,000 pairs of directions."""
+        light = np.stack([_light(brdf, (i + 0.5) * PI / 2 / ELEVATIONS) for i in range(ELEVATIONS)])
+        even = np.full(COLUMNS, 1 / COLUMNS)
+        return cls(brdf, _cumulative(light.sum(axis=-1), _band(np.arange(ROWS))), _cumulative(light, even))
+
+    def buffers(self) -> dict[str, NDArray[Any]]:
+        return {"rows": self.rows.reshape(-1), "columns": self.columns.reshape(-1)}
+
+    def draw(self, wo: Triple, u: Triple, buffers: Buffers) -> tuple[Triple, Array]:
+        f = ops(wo[0])
+        node = _elevation(wo)
+        row, down, row_share = _inverted(buffers["rows"], node * (ROWS + 1), ROWS, u[1])
+        table = (node * ROWS + row) * (COLUMNS + 1)
+        column, along, column_share = _inverted(buffers["columns"], table, COLUMNS, u[2])
+        theta, band = row * HEIGHT, _band(row)
+        sin2, cos2 = f.sin(theta) ** 2 + down * band, f.cos(theta) ** 2 - down * band
+        sin, cos = f.sqrt(sin2), f.sqrt(f.maximum(cos2, 0.0))
+        phi = (column + along) * WIDTH
+        x, y = sin * f.cos(phi), sin * f.sin(phi)
+        y = f.where(u[0] < 0.5, -y, y)
+        east, north = _azimuth(wo)
+        wi = x * east - y * north, x * north + y * east, cos
+        return wi, f.where((wo[2] > 0.0) & (cos > 0.0), _per_solid_angle(row_share * column_share, band, cos), 0.0)
+
+    def density(self, wi: Triple, wo: Triple, buffers: Buffers) -> Array:
+        f = ops(wi[0])
+        node = _elevation(wo)
+        row = _bin(_polar(wi), HEIGHT, ROWS)
+        east, north = _azimuth(wo)
+        phi = f.atan2(abs(wi[1] * east - wi[0] * north), wi[0] * east + wi[1] * north)
+        column = _bin(phi, WIDTH, COLUMNS)
+        row_share = _share(buffers["rows"], node * (ROWS + 1) + row)
+        column_share = _share(buffers["columns"], (node * ROWS + row) * (COLUMNS + 1) + column)
+        pdf = _per_solid_angle(row_share * column_share, _band(row), wi[2])
+        return f.where((wi[2] > 0.0) & (wo[2] > 0.0), pdf, 0.0)
+
+
+def _polar(w: Triple) -> Array:
+    """The angle from the normal [rad]."""
+    f = ops(w[0])
+    return f.atan2(f.sqrt(w[0] * w[0] + w[1] * w[1]), w[2])
+
+
+def _bin(x: Array, width: float, count: int) -> Array:
+    """The number of the bin that holds x, the last one for what is beyond."""
+    f = ops(x)
+    return f.to_index(f.minimum(x * (1 / width), count - 1.0))
+
+
+def _elevation(wo: Triple) -> Array:
+    """The number of the viewer's table."""
+    return _bin(_polar(wo), PI / 2 / ELEVATIONS, ELEVATIONS)
+
+
+def _azimuth(wo: Triple) -> tuple[Array, Array]:
+    """Cosine and sine of the viewer's azimuth."""
+    f = ops(wo[0])
+    sin2 = wo[0] * wo[0] + wo[1] * wo[1]
+    upright = sin2 < UPRIGHT
+    sin = f.sqrt(f.where(upright, 1.0, sin2))
+    return f.where(upright, 1.0, wo[0] / sin), f.where(upright, 0.0, wo[1] / sin)
+
+
+def _band(row: Array) -> Array:
+    """∫ 2 sin θ cos θ dθ over a row: sin² θ at its end less that at its beginning. All rows' add up to 1."""
+    return math.sin(HEIGHT) * ops(row * HEIGHT).sin((2 * row + 1) * HEIGHT)
+
+
+def _per_solid_angle(share: Array, band: Array, cos: Array) -> Array:
+    """The density of directions that follow the cosine in a cell, drawn with that probability on either side."""
+    return share * cos / (band * WIDTH)
+
+
+def _share(cdf: Any, index: Array) -> Array:
+    """The probability of a bin: exactly what inverting the CDF gives it."""
+    gather = ops(index).gather
+    return gather(cdf, index + 1) - gather(cdf, index)
+
+
+def _inverted(cdf: Any, start: Array, count: int, u: Array) -> tuple[Array, Array, Array]:
+    """The bin of a CDF that begins at `start` that holds u; how far u is in it, from 0 to 1; and its probability."""
+    f = ops(u)
+    bin_ = 0 * start
+    for bit in reversed(range((count - 1).bit_length())):
+        further = bin_ + (1 << bit)
+        # Beyond the last bin there is a 1, which no u reaches.
+        bin_ = f.where(f.gather(cdf, start + f.minimum(further, count)) <= u, further, bin_)
+    share = _share(cdf, start + bin_)
+    return bin_, (u - f.gather(cdf, start + bin_)) / share, share
+
+
+def _light(brdf: Brdf, theta_o: float) -> NDArray[np.float64]:
+    """The light of each cell for one elevation of the viewer, (ROWS, COLUMNS), up to a factor."""
+    theta, phi = (np.arange(ROWS) + 0.5) * HEIGHT, (np.arange(COLUMNS) + 0.5) * WIDTH
+    wi = np.stack(spherical(*np.broadcast_arrays(theta[:, None], phi)), axis=-1)
+    f_r = brdf.eval(wi, np.array(spherical(np.float64(theta_o), np.float64(0.0))))
+    return f_r.mean(axis=-1) * _band(np.arange(ROWS))[:, None]
+
+
+def _cumulative(light: NDArray[np.float64], floor: NDArray[np.float64]) -> NDArray[np.float32]:
+    """The CDFs along the last axis, from 0 to 1, of `light` and a share of `floor`; of `floor` alone without light."""
+    total = light.sum(axis=-1, keepdims=True)
+    share = np.where(total > 0, light / np.where(total > 0, total, 1.0), floor)
+    cdf = np.cumsum((1 - FLOOR) * share + FLOOR * floor, axis=-1)
+    cdf = np.pad(cdf, [(0, 0)] * (cdf.ndim - 1) + [(1, 0)])
+    cdf[..., -1] = 1
+    return cdf.astype(np.float32)
