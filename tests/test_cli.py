@@ -13,6 +13,7 @@ from sommerl import NAMES, BrdfTable, Lattice, load
 from sommerl.cli import main
 from sommerl.formats import merl
 from sommerl.load import load_table
+from sommerl.sampling.named import SAMPLERS
 
 QUICK = ["--clusters", "16", "--epochs", "1"]
 SMALL_PICTURE = ["--size", "24", "--spp", "4"]
@@ -147,6 +148,17 @@ def test_render(capsys, folder, tmp_path, extension):
     assert path.read_bytes() != first
 
 
+@pytest.mark.parametrize("sampler", SAMPLERS)
+def test_render_with_a_sampler(capsys, folder, tmp_path, sampler):
+    def pixels(name, *options):
+        found = run_json(capsys, "render", folder / "pearl.smrl", "-o", tmp_path / name, *SMALL_PICTURE, *options)
+        return found["sampler"], (tmp_path / name).read_bytes()
+
+    chosen, ours = pixels("chosen.exr", "--sampler", sampler), pixels("ours.exr")
+    assert (chosen[0], ours[0]) == (sampler, "half-vector")
+    assert (chosen[1] == ours[1]) == (sampler == "half-vector")
+
+
 def test_render_in_an_environment_from_a_file(capsys, folder, tmp_path):
     run_json(capsys, "render", folder / "pearl.smrl", "-o", tmp_path / "probe.exr", *SMALL_PICTURE)
     options = "-o", tmp_path / "out.png", "--envmap", tmp_path / "probe.exr"
@@ -239,6 +251,7 @@ def test_bad_files_are_refused_by_every_command(capsys, tmp_path, command, name)
         (["render", "nickel", "-o", "{}/x.jpg"], 2, "expected a name that ends in .png or .exr"),
         (["render", "nickel", "-o", "{}/x.png", "--envmap", "{}/no.exr"], 1, "found no file"),
         (["render", "nickel", "-o", "{}/x.png", "--scene", "moon"], 2, "invalid choice: 'moon'"),
+        (["render", "nickel", "-o", "{}/x.png", "--sampler", "dice"], 2, "invalid choice: 'dice' (choose from"),
         (["compres"], 2, "invalid choice: 'compres'"),
         ([], 2, "required: COMMAND"),
         (["demo", "--out", "/dev/null/demo"], 1, "/dev/null/demo"),

@@ -21,6 +21,7 @@ from .materials import NAMES
 from .models.multi_lobe import FAMILIES
 from .paper import report
 from .render.scenes import DEFAULT_SIZE, DEFAULT_SPP
+from .sampling.named import OURS, SAMPLERS
 from .som_man.budget import DEFAULT_PSNR, LARGEST_SIZE, SMALLEST_SIZE
 from .som_man.options import Order, Rule, Topology, TrainOptions
 
@@ -236,6 +237,12 @@ def _render(add: Any) -> None:
         "--lookup",
         choices=INTERPOLATIONS,
         help="how it is looked up (tables: trilinear)",
+    )
+    command.add_argument(
+        "--sampler",
+        choices=[*SAMPLERS],
+        default=OURS.name,
+        help="how directions to the light are drawn; all give the same image, with more or less noise (%(default)s)",
     )
     _rendering(command)
 

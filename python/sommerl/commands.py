@@ -40,6 +40,7 @@ from .render.images import side_by_side, write_image
 from .render.llvm import mitsuba
 from .render.scenes import LARGEST_SIZE, sphere
 from .render.scenes import render as render_scene
+from .sampling import named
 from .som_man import budget
 from .som_man import file as smrl
 from .som_man.budget import CompactOptions
@@ -233,7 +234,8 @@ def render(options: Namespace) -> dict[str, Any]:
     environment = _environment(options)
     started = time.perf_counter()
     with console.progress("rendering") as advance:
-        scene = sphere(brdf, environment, size=options.size)
+        sampler = named.fitted(options.sampler, brdf)
+        scene = sphere(brdf, environment, sampler=sampler, size=options.size)
         image = render_scene(scene, spp=options.spp, seed=options.seed, progress=advance)
     seconds = time.perf_counter() - started
     linear = options.output.suffix.lower() == ".exr"
@@ -247,6 +249,7 @@ def render(options: Namespace) -> dict[str, Any]:
         "spp": options.spp,
         "variant": mitsuba().variant(),
         "material": label(brdf),
+        "sampler": options.sampler,
     }
 
 

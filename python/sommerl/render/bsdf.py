@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..arrays import Packed16
 from ..brdf import Brdf
 from ..load import interpolated, load
-from ..sampling.half_vector import HalfVectorSampler
+from ..sampling import named
 from ..sampling.sampler import Sampler
 from .llvm import drjit, mitsuba
 
@@ -23,14 +23,15 @@ def make_bsdf(brdf: Brdf, sampler: Sampler | None = None) -> Any:
     sampler: of directions, see `sampling`; ours, fitted to `brdf`, if None. Give the reference's to every candidate
         that it is compared with, so that all are rendered with the same directions.
     """
-    return _plugin()(mitsuba().Properties(), brdf, sampler or HalfVectorSampler.fitted(brdf))
+    return _plugin()(mitsuba().Properties(), brdf, sampler or named.OURS.fitted(brdf))
 
 
 def register() -> None:
     """Makes the plug-in `sommerl` known to scenes in Mitsuba's present variant, as Mitsuba's own Python plug-ins are.
 
     Properties: `filename`, a built-in's name or a path, which may be relative to the scene file; `interpolation`,
-    nearest or trilinear, if it is not to be the material's own.
+    nearest or trilinear, if it is not to be the material's own; `sampler`, one of the names in `sampling.named`, if it
+    is not to be ours.
     """
     mitsuba().register_bsdf("sommerl", _from_properties)
 
@@ -44,7 +45,8 @@ def _from_properties(props: Any) -> Any:
     brdf = load(found)
     if "interpolation" in props:
         brdf = interpolated(brdf, props["interpolation"])
-    return _plugin()(props, brdf, HalfVectorSampler.fitted(brdf))
+    sampler = str(props["sampler"]) if "sampler" in props else named.OURS.name
+    return _plugin()(props, brdf, named.fitted(sampler, brdf))
 
 
 def upload(buffer: NDArray[Any]) -> Any:

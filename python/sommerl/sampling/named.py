@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from ..brdf import Brdf
+from ..errors import OptionError
 from .blinn_phong import BlinnPhongSampler
 from .cosine import CosineSampler
 from .half_vector import HalfVectorSampler
@@ -12,3 +14,10 @@ OURS = HalfVectorSampler
 SAMPLERS: dict[str, type[Sampler]] = {
     kind.name: kind for kind in (OURS, MatusikSampler, BlinnPhongSampler, CosineSampler)
 }
+
+
+def fitted(name: str, brdf: Brdf) -> Sampler:
+    """The sampler of that name for a BRDF. Raises OptionError if there is none of that name."""
+    if name not in SAMPLERS:
+        raise OptionError(f"sampler: expected {' or '.join(SAMPLERS)}, found {name}")
+    return SAMPLERS[name].fitted(brdf)
