@@ -11,7 +11,7 @@ from sommerl.metrics import image_metrics
 from sommerl.render.environment import default_environment
 from sommerl.render.llvm import mitsuba
 from sommerl.render.scenes import render, sphere
-from sommerl.sampling import BlinnPhongSampler
+from sommerl.sampling.blinn_phong import BlinnPhongSampler
 
 A, B = (w[w[:, 2] > 0.1][:2000] for w in (random_directions(3000, s) for s in (1, 2)))
 

@@ -10,7 +10,8 @@ from sommerl import BrdfTable, Lattice, TrainOptions, builtin, save, train
 from sommerl.arrays import Packed16, gather3, ops
 from sommerl.render.bsdf import make_bsdf, register, upload
 from sommerl.render.llvm import drjit, mitsuba
-from sommerl.sampling import BlinnPhongSampler
+from sommerl.sampling.blinn_phong import BlinnPhongSampler
+from sommerl.sampling.named import SAMPLERS
 
 mi, dr = mitsuba(), drjit()
 LATTICE = Lattice(30, 30, 30)
@@ -117,7 +118,7 @@ def test_directions_pass_the_chi_square_test(name, degrees):
 def test_that_check_notices_a_sampler_with_another_lobe(degrees):
     brdf = table("blue-metallic-paint")
     fitted = BlinnPhongSampler.fitted(brdf)
-    other = make_bsdf(brdf, BlinnPhongSampler(fitted.exponent * 1.1, fitted.specular))
+    other = make_bsdf(brdf, BlinnPhongSampler(brdf, fitted.exponent * 1.1, fitted.specular))
     must_fail(lambda: check_chi2(brdf, degrees, sampler=fitted, plugin=other))
 
 
@@ -167,6 +168,18 @@ def test_scene_files_can_choose_the_interpolation(tmp_path):
     check_agrees_with_numpy(material.with_interpolation("trilinear"), np.array(value).T / PAIRS[0][:, 2:])
     with pytest.raises(RuntimeError, match="found a formula"):  # as which Mitsuba passes on the errors of plug-ins
         mi.load_dict({"type": "sommerl", "filename": "nickel", "interpolation": "nearest"})
+
+
+def test_scene_files_can_choose_the_sampler():
+    register()
+    wi, si = mi.Vector3f(*PAIRS[0].T), interaction(PAIRS[1].T)
+    for name, kind in SAMPLERS.items():
+        bsdf = mi.load_dict({"type": "sommerl", "filename": "nickel", "sampler": name})
+        expected = make_bsdf(builtin("nickel"), kind.fitted(builtin("nickel")))
+        assert np.array_equal(bsdf.pdf(mi.BSDFContext(), si, wi), expected.pdf(mi.BSDFContext(), si, wi))
+    names = " or ".join(SAMPLERS)
+    with pytest.raises(RuntimeError, match=f"sampler: expected {names}, found dice"):
+        mi.load_dict({"type": "sommerl", "filename": "nickel", "sampler": "dice"})
 
 
 def test_paths_in_a_scene_file_may_be_relative_to_it(tmp_path):

@@ -83,9 +83,9 @@ class HalfVectorSampler(Sampler):
     def density(self, wi: Triple, wo: Triple, buffers: Buffers) -> Array:
         f = ops(wi[0])
         above = (wi[2] > 0.0) & (wo[2] > 0.0)
-        # The half vector, and the viewer, whose lengths in the plane of the surface need not be known.
-        hx, hy, hz = (wi[0] + wo[0]) + TINY, wi[1] + wo[1], f.where(above, wi[2] + wo[2], 1.0)
+        # The viewer, raised as in `_mirrored`, and the half vector. Their lengths along the surface need not be known.
         x, y, z = wo[0] + TINY, wo[1], f.maximum(wo[2], LOWEST)
+        hx, hy, hz = (wi[0] + wo[0]) + TINY, wi[1] + wo[1], f.where(above, wi[2] + z, 1.0)
         along, across = hx * x + hy * y, hx * y - hy * x
         flat = hx * hx + hy * hy
         over = _inverse_extent(along, z * z * flat)
@@ -188,8 +188,10 @@ def _probabilities(brdf: Brdf) -> NDArray[np.float64]:
     padded = np.pad(brightest, ((2, 2), (1, 1), (1, 1)), "edge")
     near = sliding_window_view(padded, (5, 3, 3)).max(axis=(-3, -2, -1))
     parts = np.maximum(rms, NEIGHBOUR * near)[::2], cosine[::2].mean(axis=-1)
-    shares = [part / part.sum(axis=(1, 2), keepdims=True) for part in parts if part.any()]
-    return ((1 - DIFFUSE) * shares[0] + DIFFUSE * shares[-1]).reshape(ELEVATIONS, CELLS)
+    totals = [part.sum(axis=(1, 2), keepdims=True) for part in parts]
+    glossy, even = (part / _positive(total) for part, total in zip(parts, totals, strict=True))
+    glossy = np.where(totals[0] > 0, glossy, even)  # an elevation may see no light at all
+    return ((1 - DIFFUSE) * glossy + DIFFUSE * even).reshape(ELEVATIONS, CELLS)
 
 
 def _positive(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -22,18 +22,35 @@ def gauss(count):
     return (nodes + 1) / 2, weights / 2
 
 
+def radius(u, limit, width):
+    """From [0, 1] to [0, limit], and the derivative: as dense about 0 as a lobe of that width asks for, then ever
+    sparser."""
+    k = np.log1p(limit / width)
+    return width * np.expm1(k * u), width * k * np.exp(k * u)
+
+
 def radii(limit, width, rows):
-    """Nodes on [0, limit], and their weights: as dense about 0 as a lobe of that width asks for, then ever sparser."""
+    """Such nodes, and their weights."""
     u, weights = gauss(rows)
-    k = np.log1p(limit / width)[..., None]
-    return width * np.expm1(k * u), width * k * np.exp(k * u) * weights
+    theta, slope = radius(u, limit[..., None], width)
+    return theta, slope * weights
+
+
+def azimuth(v):
+    """From [-1, 1] to [0, π], and the derivative: dense about π/2, where the horizon is near for a grazing axis."""
+    return np.pi / 2 * (1 + v**3), np.pi / 2 * 3 * v**2
 
 
 def meridians(columns):
-    """Azimuths in [0, π], and their weights; dense about π/2, where the horizon is near for a grazing axis."""
+    """Such azimuths, and their weights."""
     u, weights = gauss(columns)
-    turn, weights = np.pi / 2 * u**3, np.pi / 2 * 3 * u**2 * weights
-    return np.concatenate([np.pi / 2 - turn, np.pi / 2 + turn]), np.concatenate([weights, weights])
+    phi, slope = azimuth(np.concatenate([-u, u]))
+    return phi, slope * np.concatenate([weights, weights])
+
+
+def horizon(tilt, phi):
+    """The polar angle at which a meridian about a tilted axis meets the horizon."""
+    return np.arctan2(np.cos(phi) * np.sin(tilt), np.cos(tilt)) + np.pi / 2
 
 
 def about(tilt, twice, width, rows, columns):
@@ -43,7 +60,7 @@ def about(tilt, twice, width, rows, columns):
     twice: of half vectors, about the normal; the light turns by twice their angle.
     """
     phi, across = meridians(columns)
-    limit = np.arctan2(np.cos(phi) * np.sin(tilt), np.cos(tilt)) + np.pi / 2
+    limit = horizon(tilt, phi)
     theta, along = radii(limit / 2 if twice else limit, width, rows)
     phi = np.broadcast_to(phi[:, None], theta.shape)
     return theta, phi, 2 * np.sin(theta) * along * across[:, None]
@@ -52,9 +69,31 @@ def about(tilt, twice, width, rows, columns):
 def over_half_vectors(elevation, width, rows=ROWS, columns=COLUMNS):
     """Directions to the light, and their solid angles: for a lobe of that width in θ_h, seen from that elevation."""
     theta, phi, solid_angle = about(elevation, True, width, rows, columns)
+    wi, scale = mirrored(theta, phi, elevation)
+    return wi, scale * solid_angle
+
+
+def mirrored(theta, phi, elevation):
+    """The direction to the light by its half vector's angles, and dω_i / dω_h = 4 cos θ_d."""
     h, wo = np.stack(spherical(theta, phi), -1), np.array(spherical(elevation, 0.0))
     cos_d = h @ wo
-    return 2 * cos_d[..., None] * h - wo, 4 * cos_d * solid_angle  # dω_i = 4 cos θ_d dω_h
+    return 2 * cos_d[..., None] * h - wo, 4 * cos_d
+
+
+def at_half_vectors(u, v, elevation, width):
+    """Directions to the light with y ≥ 0 at places u in [0, 1], v in [-1, 1], and their solid angles per du dv."""
+    phi, across = azimuth(v)
+    theta, along = radius(u, horizon(elevation, phi) / 2, width)
+    wi, scale = mirrored(theta, phi, elevation)
+    return wi, scale * np.sin(theta) * along * across
+
+
+def places(wi, elevation, width):
+    """Where `at_half_vectors` puts directions, of either y."""
+    x, y, z = np.moveaxis(wi + np.array(spherical(elevation, 0.0)), -1, 0)
+    theta, phi = np.arctan2(np.hypot(x, y), z), np.arctan2(abs(y), x)
+    u = np.log1p(theta / width) / np.log1p(horizon(elevation, phi) / 2 / width)
+    return u, np.cbrt(phi / (np.pi / 2) - 1)
 
 
 def over_directions(axis, width, rows=ROWS, columns=COLUMNS):
