@@ -189,8 +189,10 @@ def _probabilities(brdf: Brdf) -> NDArray[np.float64]:
     near = sliding_window_view(padded, (5, 3, 3)).max(axis=(-3, -2, -1))
     parts = np.maximum(rms, NEIGHBOUR * near)[::2], cosine[::2].mean(axis=-1)
     totals = [part.sum(axis=(1, 2), keepdims=True) for part in parts]
+    glossy: NDArray[np.float64]
+    even: NDArray[np.float64]
     glossy, even = parts[0] / _positive(totals[0]), parts[1] / _positive(totals[1])
-    glossy = np.where(totals[0] > 0, glossy, even)  # an elevation may see no light at all
+    glossy = np.asarray(np.where(totals[0] > 0, glossy, even))  # an elevation may see no light at all
     return ((1 - DIFFUSE) * glossy + DIFFUSE * even).reshape(ELEVATIONS, CELLS)
 
 
