@@ -4,6 +4,7 @@ from helpers import SMALL, lambertian_table, must_fail
 
 from sommerl import BrdfTable, TrainOptions, load, save, train
 from sommerl.errors import FormatError
+from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
 from sommerl.render.compare import compare_on_sphere
 from sommerl.render.environment import LIGHTS, default_environment, load_environment
 from sommerl.render.images import difference, encode, side_by_side, write_image, write_page
@@ -158,8 +159,15 @@ def test_a_material_with_one_entry_and_one_with_sixteen_bit_indices_render(small
         assert np.isfinite(render(sphere(material, WHITE, size=8), spp=4).pixels).all()
 
 
+def check_black(brdf, most):
+    image = render(sphere(brdf, WHITE, size=16), spp=4)
+    assert image.pixels[interior(image.mask)].max() <= most
+
+
 def test_black_material_renders_black():
+    black = MultiLobe("black", [Lobe(FAMILIES["lambertian"], (0.0, 0.0, 0.0), {})])
+    check_black(black, 0.0)
     values = np.zeros((*SMALL.shape, 3))
-    values[0, 0, 0] = 1e-30
-    image = render(sphere(BrdfTable(values, SMALL), WHITE, size=16), spp=4)
-    assert image.pixels[interior(image.mask)].max() == 0
+    values[0, 0, 0] = 1e-30  # a table has to have some light
+    check_black(BrdfTable(values, SMALL), 1e-30)
+    must_fail(check_black, BrdfTable(values, SMALL), 0.0)
