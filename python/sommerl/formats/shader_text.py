@@ -194,16 +194,16 @@ SOMMERL_FUNCTION real3 @NAME@_sample(real3 wo, real3 u, SOMMERL_OUT(real) pdf) {
     real solid_angle;
     real3 wi = @NAME@_mirrored(s, c, side, wo, solid_angle);
     // Half vectors next to the normal have densities beyond single precision, and weigh nothing.
-    if (!(wi.z > real(0) && solid_angle > real(1e-35))) return real3(real(0), real(0), real(1));
+    if (!(wi.z > real(0) && solid_angle > real(@SMALLEST@))) return real3(real(0), real(0), real(1));
     pdf = @NAME@_share(first, t, cell) / solid_angle;
     return wi;
 }
 
 SOMMERL_FUNCTION real @NAME@_pdf(real3 wi, real3 wo) {
     if (!(wi.z > real(0) && wo.z > real(0))) return real(0);
-    // The half vector, and the viewer, whose lengths in the plane of the surface need not be known.
-    real hx = (wi.x + wo.x) + real(@TINY@), hy = wi.y + wo.y, hz = wi.z + wo.z;
+    // The viewer, raised as in _mirrored, and the half vector. Their lengths along the surface need not be known.
     real x = wo.x + real(@TINY@), y = wo.y, z = max(wo.z, real(@LOWEST@));
+    real hx = (wi.x + wo.x) + real(@TINY@), hy = wi.y + wo.y, hz = wi.z + z;
     real along = hx * x + hy * y, across = hx * y - hy * x;
     real least = real(@TINY@) * real(@TINY@);  // in single precision, these lengths can be 0
     real flat2 = max(hx * hx + hy * hy, least);

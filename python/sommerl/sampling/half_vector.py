@@ -35,6 +35,7 @@ SLOTS = 256  # of a cell in the alias table
 SLOT_BITS = 8
 WHOLE = CELLS * SLOTS  # the probability 1
 
+SMALLEST = 1e-35  # solid angle of a direction that is drawn, times its density in the unit square
 TINY = 1e-9  # added to lengths along x, so that the azimuth of the normal itself is defined
 LOWEST = 1e-4  # cos θ_o of the table's lowest elevation, 0 but for numbers that need some width
 DIFFUSE = 0.03  # share of directions that follow the cosine
@@ -77,8 +78,9 @@ class HalfVectorSampler(Sampler):
         s = ((cell // COLUMNS) + u[1]) * (1.0 / ROWS)
         c = ((cell % COLUMNS) + abs(side)) * (2.0 / COLUMNS)
         wi, solid_angle = _mirrored(s, c, side, wo)
-        drawn = (wo[2] > 0.0) & (wi[2] > 0.0)
-        return wi, f.where(drawn, _share(table, first, t, cell) / solid_angle, 0.0)
+        # Half vectors next to the normal have densities beyond single precision, and weigh nothing.
+        drawn = (wo[2] > 0.0) & (wi[2] > 0.0) & (solid_angle > SMALLEST)
+        return wi, f.where(drawn, _share(table, first, t, cell) / f.where(drawn, solid_angle, 1.0), 0.0)
 
     def density(self, wi: Triple, wo: Triple, buffers: Buffers) -> Array:
         f = ops(wi[0])
@@ -87,10 +89,11 @@ class HalfVectorSampler(Sampler):
         x, y, z = wo[0] + TINY, wo[1], f.maximum(wo[2], LOWEST)
         hx, hy, hz = (wi[0] + wo[0]) + TINY, wi[1] + wo[1], f.where(above, wi[2] + z, 1.0)
         along, across = hx * x + hy * y, hx * y - hy * x
-        flat = hx * hx + hy * hy
+        # In single precision, these lengths can be 0, and products of all of them, too.
+        flat = f.maximum(hx * hx + hy * hy, TINY * TINY)
         over = _inverse_extent(along, z * z * flat)
-        s = f.sqrt(f.sqrt(f.sqrt(f.minimum(flat * over[0] / ((flat + hz * hz) * over[1]), 1.0))))
-        rim = 1.0 / (abs(along) + abs(across))
+        s = f.sqrt(f.sqrt(f.sqrt(f.minimum(flat / (flat + hz * hz) * (over[0] / over[1]), 1.0))))
+        rim = 1.0 / f.maximum(abs(along) + abs(across), TINY * TINY)
         c = 1.0 - along * rim
         row = f.to_index(f.minimum(s * ROWS, ROWS - 1.0))
         column = f.to_index(f.minimum(c * (COLUMNS / 2), COLUMNS - 1.0))
