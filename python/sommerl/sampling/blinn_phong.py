@@ -73,8 +73,7 @@ class BlinnPhongSampler(Sampler):
         above = (wi[2] > 0.0) & (wo[2] > 0.0)
         length = f.where(above, length, 1.0)
         cos_h = f.where(above, h[2], 1.0) / length
-        cos_d = (h[0] * wo[0] + h[1] * wo[1] + h[2] * wo[2]) / length
         lobe = (exponent + 1.0) / TWO_PI * f.power(cos_h, exponent)
-        # dω_h = dω_i / (4 cos θ_d)
-        glossy = lobe / (4.0 * f.where(above, cos_d, 1.0))
+        # dω_h = dω_i / (4 cos θ_d), and cos θ_d = |ω_i + ω_o| / 2, which no rounding makes negative.
+        glossy = lobe / (2.0 * length)
         return f.where(above, specular * glossy + (1.0 - specular) * (wi[2] / PI), 0.0)
