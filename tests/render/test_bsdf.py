@@ -154,7 +154,10 @@ def test_sample_weight_is_value_over_density(name):
     value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, sample.wo)
     drawn = np.array(sample.pdf) > 0
     assert 0.5 < drawn.mean() <= 1
-    assert (drawn.mean() < 1) == (name == "blinn-phong")  # which draws directions below the horizon, too
+    if name == "blinn-phong":  # which draws directions below the horizon, too
+        assert drawn.mean() < 1
+    if name in ("half-vector", "matusik", "cosine"):
+        assert drawn.mean() == 1
     # Single precision moves a few directions into the cell next door.
     same = np.isclose(np.array(pdf)[drawn], np.array(sample.pdf)[drawn], rtol=1e-3)
     assert same.mean() == 1 if name in ("blinn-phong", "cosine") else same.mean() > 0.998

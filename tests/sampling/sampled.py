@@ -32,6 +32,7 @@ MATERIALS = {
     # Not the same on both sides of the viewer's plane, nor in both orders.
     "handed": BrdfTable(np.random.default_rng(0).random((*HANDED.shape, 3)) ** 6, HANDED),
 }
+LOSSLESS = ("half-vector", "matusik", "cosine")  # draw nothing below the horizon
 CASES = [(name, material, degrees) for name in SAMPLERS for material in MATERIALS for degrees in ANGLES]
 
 
