@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from helpers import lambertian_table, must_fail, random_directions
+from histograms import viewer
 
 from sommerl import NAMES, builtin
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
@@ -9,11 +10,6 @@ from sommerl.sampling.blinn_phong import BlinnPhongSampler
 ANGLES = (0, 45, 80)
 CHALK = lambertian_table(0.7)
 SHARP = BlinnPhongSampler(CHALK, 50.0, 0.7)
-
-
-def viewer(degrees):
-    theta = np.radians(degrees)
-    return np.array([np.sin(theta), 0.0, np.cos(theta)])
 
 
 def hemisphere(n=1200):

@@ -91,8 +91,8 @@ class HalfVectorSampler(Sampler):
         along, across = hx * x + hy * y, hx * y - hy * x
         # In single precision, these lengths can be 0, and products of all of them, too.
         flat = f.maximum(hx * hx + hy * hy, TINY * TINY)
-        over = _inverse_extent(along, z * z * flat)
-        s = f.sqrt(f.sqrt(f.sqrt(f.minimum(flat / (flat + hz * hz) * (over[0] / over[1]), 1.0))))
+        extent = _extent(along, z * z * flat)
+        s = f.sqrt(f.sqrt(f.sqrt(f.minimum(flat / ((flat + hz * hz) * extent), 1.0))))
         rim = 1.0 / f.maximum(abs(along) + abs(across), TINY * TINY)
         c = 1.0 - along * rim
         row = f.to_index(f.minimum(s * ROWS, ROWS - 1.0))
@@ -119,8 +119,8 @@ def _share(table: Any, first: Array, t: Array, cell: Array) -> Array:
     return (here + t * (next_ - here)) * (1.0 / SLOTS)
 
 
-def _inverse_extent(along: Array, upright2: Array) -> tuple[Array, Array]:
-    """1 / sin² θ_max, as numerator and denominator, of half vectors in a plane through the normal.
+def _extent(along: Array, upright2: Array) -> Array:
+    """sin² θ_max of half vectors in a plane through the normal.
 
     In that plane the viewer's direction has the components `along` the surface and `upright`, whose square is given, in
     any one unit: at the angle δ = atan2(along, upright) from the normal. Light is on the horizon where
@@ -129,7 +129,7 @@ def _inverse_extent(along: Array, upright2: Array) -> tuple[Array, Array]:
     f = ops(along)
     r = f.sqrt(along * along + upright2)
     a = r + abs(along)
-    return 2.0 * r * a, f.where(along < 0.0, upright2, a * a)
+    return f.where(along < 0.0, upright2, a * a) / (2.0 * r * a)
 
 
 def _mirrored(s: Array, c: Array, side: Array, wo: Triple) -> tuple[Triple, Array]:
@@ -147,8 +147,7 @@ def _mirrored(s: Array, c: Array, side: Array, wo: Triple) -> tuple[Triple, Arra
     across = wx * wx + wy * wy
     scale = 1.0 / f.sqrt(round_ * across)
     tilt = x * across * scale
-    over = _inverse_extent(tilt, wz * wz)
-    extent = over[1] / over[0]
+    extent = _extent(tilt, wz * wz)
     s2 = s * s
     s6 = s2 * s2 * s2
     sin2 = s6 * s2 * extent
@@ -190,12 +189,11 @@ def _probabilities(brdf: Brdf) -> NDArray[np.float64]:
     brightest = (light / _positive(albedo)).max(axis=(-2, -1))
     padded = np.pad(brightest, ((2, 2), (1, 1), (1, 1)), "edge")
     near = sliding_window_view(padded, (5, 3, 3)).max(axis=(-3, -2, -1))
-    parts = np.maximum(rms, NEIGHBOUR * near)[::2], cosine[::2].mean(axis=-1)
-    totals = [part.sum(axis=(1, 2), keepdims=True) for part in parts]
-    glossy: NDArray[np.float64]
-    even: NDArray[np.float64]
-    glossy, even = parts[0] / _positive(totals[0]), parts[1] / _positive(totals[1])
-    glossy = np.asarray(np.where(totals[0] > 0, glossy, even))  # an elevation may see no light at all
+    bounded: NDArray[np.float64] = np.maximum(rms, NEIGHBOUR * near)[::2]
+    even: NDArray[np.float64] = cosine[::2].mean(axis=-1)
+    total = bounded.sum(axis=(1, 2), keepdims=True)
+    even /= even.sum(axis=(1, 2), keepdims=True)
+    glossy = np.where(total > 0, bounded / _positive(total), even)  # an elevation may see no light at all
     return ((1 - DIFFUSE) * glossy + DIFFUSE * even).reshape(ELEVATIONS, CELLS)
 
 
