@@ -6,9 +6,10 @@ import zlib
 import numpy as np
 
 from sommerl import SomManBrdf
+from sommerl.container import PREFIX
 from sommerl.nodes import FINE, NodeLattice
 from sommerl.som_man.codes import gain_values, shape_values
-from sommerl.som_man.file import MAGIC, PREFIX, VERSION, decode
+from sommerl.som_man.file import MAGIC, VERSION, decode
 
 # Bands, inner nodes of an axis at most, gains, shapes, and how the entries come.
 CASES = {

@@ -6,18 +6,22 @@ the rounding to 8 bits, which hides some small differences and enlarges others.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Triple
 from .errors import MaterialError
+from .half_diff import directions
 from .lattice import Lattice
 from .optional import optional
 
 EXPOSURE_PERCENTILE, EXPOSED_TO = 90, 0.6
 LOG_FLOOR = 1e-3  # [1/sr]: reflectances well below it count as black in the log error
+QUADRATURE = Lattice(45, 30, 36)  # of the asymmetry
 PEAK_LUMINANCE = 100.0  # cd/m², of the display that shows the 8-bit image
 
 Pixels = NDArray[np.float32]
@@ -55,6 +59,16 @@ def table_metrics(reference: NDArray[np.float64], candidate: NDArray[np.float64]
         log_error_cosine=float(np.sqrt(log_squared / (3 * weights.sum()))),
         relative_error=float(np.sqrt(squared / energy)),
     )
+
+
+def asymmetry(f_r: Callable[[Triple, Triple], Triple]) -> float:
+    """How far from reciprocal a BRDF is: ∬ |f(a, b) − f(b, a)| cos cos dω dω over the same integral of their mean,
+    channels added. 0 for a reciprocal one, and for a black one.
+    """
+    weight = (QUADRATURE.solid_angles() * np.prod(QUADRATURE.cosines(), axis=0))[QUADRATURE.above_horizon]
+    wi, wo = directions(*(angle[QUADRATURE.above_horizon] for angle in QUADRATURE.angles()))
+    one, other = np.sum(f_r(wi, wo), axis=0), np.sum(f_r(wo, wi), axis=0)
+    return float((weight * abs(one - other)).sum() / max((weight * (one + other) / 2).sum(), 1e-300))
 
 
 @dataclass(frozen=True)

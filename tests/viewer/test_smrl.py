@@ -13,8 +13,9 @@ from compact import CASES, arrays, broken, material, sealed
 from helpers import must_fail, tool
 
 from sommerl import Lattice, SomManBrdf
+from sommerl.container import PREFIX
 from sommerl.errors import FormatError
-from sommerl.som_man.file import PREFIX, decode, encode
+from sommerl.som_man.file import decode, encode
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 MAIN = """

@@ -19,7 +19,8 @@ from ..arrays import Array, Triple, ops
 from ..brdf import Brdf, Buffers
 from ..errors import FormatError
 from ..half_diff import TWO_PI, directions
-from ..lattice import MERL, Lattice
+from ..lattice import MERL
+from ..metrics import asymmetry
 from . import tensor
 from .names import printable, sha256_of
 from .spectra import srgb_weights
@@ -28,7 +29,6 @@ LARGEST_SIDE = 4096  # of any grid in a file
 MOST_ANGLES = 1024
 MOST_WAVELENGTHS = 4096
 SMALLEST_COSINE = 0.01  # that a stored f_r cos θ_o is divided by
-QUADRATURE = Lattice(45, 30, 36)  # of the asymmetry
 
 
 class RglBrdf(Brdf):
@@ -81,18 +81,14 @@ class RglBrdf(Brdf):
         """How far from reciprocal the measurement is, and how many of MERL's cells that are not 0 the bound on cosines
         makes smaller.
 
-        asymmetry: ∬ |f(a, b) − f(b, a)| cos cos dω dω over the same integral of their mean, channels added.
+        asymmetry: see `metrics.asymmetry`.
         """
-        weight = (QUADRATURE.solid_angles() * np.prod(QUADRATURE.cosines(), axis=0))[QUADRATURE.above_horizon]
-        wi, wo = directions(*(angle[QUADRATURE.above_horizon] for angle in QUADRATURE.angles()))
-        one = np.sum(self._raw(wi, wo, self._buffers), axis=0)
-        other = np.sum(self._raw(wo, wi, self._buffers), axis=0)
-        asymmetry = float((weight * abs(one - other)).sum() / max((weight * (one + other) / 2).sum(), 1e-300))
+        one_sided = asymmetry(lambda wi, wo: self._raw(wi, wo, self._buffers))
         cos_i, cos_o = MERL.cosines()
         divided = np.minimum(cos_i, cos_o) if self.reciprocal else cos_i
         near = MERL.above_horizon & (divided < SMALLEST_COSINE)
         touched = np.any(self.f_r(*directions(*(angle[near] for angle in MERL.angles())), self._buffers), axis=0)
-        return {"reciprocal": self.reciprocal, "asymmetry": asymmetry, "cells_near_grazing": int(touched.sum())}
+        return {"reciprocal": self.reciprocal, "asymmetry": one_sided, "cells_near_grazing": int(touched.sum())}
 
     def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
         forward = self._raw(wo, wi, buffers)

@@ -24,6 +24,7 @@ from ..arrays import Array, Triple, ops
 from ..brdf import Brdf, Buffers
 from ..half_diff import spherical
 from .sampler import PI, Sampler
+from .tables import cumulative, inverted, probability
 
 ELEVATIONS = 90  # of the viewer, equal in θ_o; each table serves the whole of its degree, from its centre
 ROWS, COLUMNS = 90, 180  # of a table: equal in θ_i, and in φ over half of the circle
@@ -53,7 +54,7 @@ class MatusikSampler(Sampler):
         """The sampler of a BRDF, which is evaluated for 1,458,000 pairs of directions."""
         light = np.stack([_light(brdf, (i + 0.5) * PI / 2 / ELEVATIONS) for i in range(ELEVATIONS)])
         even = np.full(COLUMNS, 1 / COLUMNS)
-        return cls(brdf, _cumulative(light.sum(axis=-1), _band(np.arange(ROWS))), _cumulative(light, even))
+        return cls(brdf, cumulative(light.sum(axis=-1), _band(np.arange(ROWS)), FLOOR), cumulative(light, even, FLOOR))
 
     def buffers(self) -> dict[str, NDArray[Any]]:
         return {"rows": self.rows.reshape(-1), "columns": self.columns.reshape(-1)}
@@ -61,9 +62,9 @@ class MatusikSampler(Sampler):
     def draw(self, wo: Triple, u: Triple, buffers: Buffers) -> tuple[Triple, Array]:
         f = ops(wo[0])
         node = _elevation(wo)
-        row, down, row_share = _inverted(buffers["rows"], node * (ROWS + 1), ROWS, u[1])
+        row, down, row_share = inverted(buffers["rows"], node * (ROWS + 1), ROWS, u[1])
         table = (node * ROWS + row) * (COLUMNS + 1)
-        column, along, column_share = _inverted(buffers["columns"], table, COLUMNS, u[2])
+        column, along, column_share = inverted(buffers["columns"], table, COLUMNS, u[2])
         theta, band = row * HEIGHT, _band(row)
         sin2, cos2 = f.sin(theta) ** 2 + down * band, f.cos(theta) ** 2 - down * band
         sin, cos = f.sqrt(sin2), f.sqrt(f.maximum(cos2, 0.0))
@@ -81,8 +82,8 @@ class MatusikSampler(Sampler):
         east, north = _azimuth(wo)
         phi = f.atan2(abs(wi[1] * east - wi[0] * north), wi[0] * east + wi[1] * north)
         column = _bin(phi, WIDTH, COLUMNS)
-        row_share = _share(buffers["rows"], node * (ROWS + 1) + row)
-        column_share = _share(buffers["columns"], (node * ROWS + row) * (COLUMNS + 1) + column)
+        row_share = probability(buffers["rows"], node * (ROWS + 1) + row)
+        column_share = probability(buffers["columns"], (node * ROWS + row) * (COLUMNS + 1) + column)
         pdf = _per_solid_angle(row_share * column_share, _band(row), wi[2])
         return f.where((wi[2] > 0.0) & (wo[2] > 0.0), pdf, 0.0)
 
@@ -123,37 +124,9 @@ def _per_solid_angle(share: Array, band: Array, cos: Array) -> Array:
     return share * cos / (band * WIDTH)
 
 
-def _share(cdf: Any, index: Array) -> Array:
-    """The probability of a bin: exactly what inverting the CDF gives it."""
-    gather = ops(index).gather
-    return gather(cdf, index + 1) - gather(cdf, index)
-
-
-def _inverted(cdf: Any, start: Array, count: int, u: Array) -> tuple[Array, Array, Array]:
-    """The bin of a CDF that begins at `start` that holds u; how far u is in it, from 0 to 1; and its probability."""
-    f = ops(u)
-    bin_ = 0 * start
-    for bit in reversed(range((count - 1).bit_length())):
-        further = bin_ + (1 << bit)
-        # Beyond the last bin there is a 1, which no u reaches.
-        bin_ = f.where(f.gather(cdf, start + f.minimum(further, count)) <= u, further, bin_)
-    share = _share(cdf, start + bin_)
-    return bin_, (u - f.gather(cdf, start + bin_)) / share, share
-
-
 def _light(brdf: Brdf, theta_o: float) -> NDArray[np.float64]:
     """The light of each cell for one elevation of the viewer, (ROWS, COLUMNS), up to a factor."""
     theta, phi = (np.arange(ROWS) + 0.5) * HEIGHT, (np.arange(COLUMNS) + 0.5) * WIDTH
     wi = np.stack(spherical(*np.broadcast_arrays(theta[:, None], phi)), axis=-1)
     f_r = brdf.eval(wi, np.array(spherical(np.float64(theta_o), np.float64(0.0))))
     return f_r.mean(axis=-1) * _band(np.arange(ROWS))[:, None]
-
-
-def _cumulative(light: NDArray[np.float64], floor: NDArray[np.float64]) -> NDArray[np.float32]:
-    """The CDFs along the last axis, from 0 to 1, of `light` and a share of `floor`; of `floor` alone without light."""
-    total = light.sum(axis=-1, keepdims=True)
-    share = np.where(total > 0, light / np.where(total > 0, total, 1.0), floor)
-    cdf = np.cumsum((1 - FLOOR) * share + FLOOR * floor, axis=-1)
-    cdf = np.pad(cdf, [(0, 0)] * (cdf.ndim - 1) + [(1, 0)])
-    cdf[..., -1] = 1
-    return cdf.astype(np.float32)

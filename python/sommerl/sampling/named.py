@@ -7,12 +7,13 @@ from ..errors import OptionError
 from .blinn_phong import BlinnPhongSampler
 from .cosine import CosineSampler
 from .half_vector import HalfVectorSampler
+from .lawrence import LawrenceSampler
 from .matusik import MatusikSampler
 from .sampler import Sampler
 
 OURS = HalfVectorSampler
 SAMPLERS: dict[str, type[Sampler]] = {
-    kind.name: kind for kind in (OURS, MatusikSampler, BlinnPhongSampler, CosineSampler)
+    kind.name: kind for kind in (OURS, LawrenceSampler, MatusikSampler, BlinnPhongSampler, CosineSampler)
 }
 
 

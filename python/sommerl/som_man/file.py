@@ -25,10 +25,10 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
+from .. import _core, container
+from ..container import BYTE, Reader
 from ..errors import FormatError, SommerlError
 from ..files import atomic_write
-from ..formats.names import visible
 from ..lattice import INTERPOLATIONS, Lattice
 from ..nodes import NodeLattice
 from .codes import coordinates, gain_codes, gain_values, shape_codes, shape_values
@@ -36,15 +36,14 @@ from .material import SomManBrdf
 
 MAGIC = b"SMRL"
 VERSION = 1
-PREFIX = struct.Struct("<4sHI")
+SHORT = struct.Struct("<H")
 CELLS, NODES = 0, 1
 CELLS_HEAD = struct.Struct("<HHHBBI")
 NODES_HEAD = struct.Struct("<f")
 MOST_BINS = 2**16 - 1  # on an axis
 MOST_CELLS = 2**22  # MERL's larger kind of table has 2,916,000
 LONGEST_FILE = 2 * MOST_CELLS + 24 * 2**16 + 2**20
-LONGEST_NAME, LONGEST_NOTES = 2**8 - 1, 2**16 - 1
-DIGEST_BYTES = 32
+LONGEST_NOTES = 2**16 - 1
 
 
 def looks_like(head: bytes) -> bool:
@@ -62,16 +61,7 @@ def save(material: SomManBrdf, path: str | Path) -> int:
 
 def load(path: str | Path) -> SomManBrdf:
     """The material in a file. Raises FormatError if it is not one, or is damaged, or is of another version."""
-    path = Path(path)
-    length = path.stat().st_size
-    if length > LONGEST_FILE:
-        raise FormatError(f"{path}: expected at most {LONGEST_FILE} bytes, found {length}")
-    try:
-        material = decode(path.read_bytes())
-    except SommerlError as error:
-        raise FormatError(f"{path}: {error}") from error
-    material.name = visible(material.name)
-    return material
+    return container.load(path, LONGEST_FILE, decode)
 
 
 def encode(material: SomManBrdf) -> bytes:
@@ -81,21 +71,18 @@ def encode(material: SomManBrdf) -> bytes:
     nodes = isinstance(material.lattice, NodeLattice)
     body = _head(NODES if nodes else CELLS, material.name, material.source_sha256, notes)
     body += _nodes(material) if nodes else _cells(material)
-    return PREFIX.pack(MAGIC, VERSION, zlib.crc32(body)) + body
+    return container.sealed(MAGIC, VERSION, body)
 
 
 def head_bytes(name: str, source_sha256: str) -> int:
     """What a file of nodes holds before the stream [bytes]."""
-    return PREFIX.size + len(_head(NODES, name, source_sha256, b"")) + NODES_HEAD.size
+    return container.PREFIX.size + len(_head(NODES, name, source_sha256, b"")) + NODES_HEAD.size
 
 
 def _head(kind: int, name: str, source_sha256: str, notes: bytes) -> bytes:
-    text = name.encode("utf-8", "replace")[:LONGEST_NAME].decode("utf-8", "ignore").encode()
-    digest = bytes.fromhex(source_sha256)
-    if len(notes) > LONGEST_NOTES or len(digest) not in (0, DIGEST_BYTES):
+    if len(notes) > LONGEST_NOTES:
         raise FormatError(f"{name}: expected notes of at most {LONGEST_NOTES} bytes, found {len(notes)}")
-    head = bytes([kind, len(text)]) + text + bytes([len(digest)]) + digest
-    return head + struct.pack("<H", len(notes)) + notes
+    return BYTE.pack(kind) + container.origin(name, source_sha256) + SHORT.pack(len(notes)) + notes
 
 
 def _json(notes: dict[str, Any]) -> bytes:
@@ -107,56 +94,21 @@ def _json(notes: dict[str, Any]) -> bytes:
 
 def decode(data: bytes) -> SomManBrdf:
     """The material in the bytes of a file. Raises FormatError."""
-    if len(data) < PREFIX.size:
-        raise FormatError(f"expected at least {PREFIX.size} bytes, found {len(data)}")
-    magic, version, crc = PREFIX.unpack_from(data)
-    if magic != MAGIC:
-        raise FormatError("expected a material file (.smrl), found another kind")
-    if version != VERSION:
-        hint = "a newer Sommerl may read it" if version > VERSION else "compress the source again"
-        raise FormatError(f"expected version {VERSION}, found version {version}; {hint}")
-    if zlib.crc32(data[PREFIX.size :]) != crc:
-        raise FormatError("expected the checksum in the file, found another: the file is damaged or cut off")
+    reader = container.opened(data, MAGIC, VERSION, "material file (.smrl)")
     try:
-        return _material(_Reader(data, PREFIX.size))
+        return _material(reader)
     except FormatError:
         raise
     except (KeyError, TypeError, ValueError, RecursionError, zlib.error, SommerlError) as error:
         raise FormatError(f"expected a material file's header and contents, found others ({error})") from error
 
 
-class _Reader:
-    """Bytes, one part after the other."""
-
-    def __init__(self, data: bytes, at: int) -> None:
-        self._data, self._at = data, at
-
-    def take(self, count: int) -> bytes:
-        part = self._data[self._at : self._at + count]
-        if len(part) != count:
-            raise FormatError(f"expected {count} more bytes, found {len(part)}")
-        self._at += count
-        return part
-
-    def unpack(self, layout: struct.Struct) -> tuple[Any, ...]:
-        return layout.unpack(self.take(layout.size))
-
-    def rest(self) -> bytes:
-        return self._data[self._at :]
-
-
-BYTE, SHORT = struct.Struct("<B"), struct.Struct("<H")
-
-
-def _material(reader: _Reader) -> SomManBrdf:
+def _material(reader: Reader) -> SomManBrdf:
     (kind,) = reader.unpack(BYTE)
-    name = reader.take(*reader.unpack(BYTE)).decode()
-    (digest,) = reader.unpack(BYTE)
-    if kind not in (CELLS, NODES) or digest not in (0, DIGEST_BYTES):
-        raise FormatError(f"expected kind 0 or 1 and a digest of 0 or 32 bytes, found kind {kind} and {digest} bytes")
-    sha256 = reader.take(digest).hex()
+    if kind not in (CELLS, NODES):
+        raise FormatError(f"expected kind 0 or 1, found {kind}")
+    known: dict[str, Any] = reader.origin()
     notes = _object(json.loads(reader.take(*reader.unpack(SHORT)).decode() or "{}", parse_constant=_finite))
-    known = {"name": name, "source_sha256": sha256}
     known |= {key: _object(notes.get(key, {})) for key in ("options", "metrics")}
     return _from_nodes(reader, known) if kind == NODES else _from_cells(reader, known)
 
@@ -177,13 +129,12 @@ def _cells(material: SomManBrdf) -> bytes:
         raise FormatError(f"{material.name}: expected at most {MOST_CELLS} cells, found {lattice.shape}")
     index = material.index[lattice.above_horizon]
     payload = material.lut.astype("<f8").tobytes() + index.astype(index.dtype.newbyteorder("<")).tobytes()
-    packer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS, 9)
     interpolation = INTERPOLATIONS.index(material.interpolation)
     head = CELLS_HEAD.pack(*lattice.shape, lattice.reciprocal, interpolation, len(material.lut))
-    return head + packer.compress(payload) + packer.flush()
+    return head + container.deflated(payload)
 
 
-def _from_cells(reader: _Reader, known: dict[str, Any]) -> SomManBrdf:
+def _from_cells(reader: Reader, known: dict[str, Any]) -> SomManBrdf:
     theta_h, theta_d, phi_d, reciprocal, interpolation, clusters = map(int, reader.unpack(CELLS_HEAD))
     if theta_h * theta_d * phi_d > MOST_CELLS or not 1 <= clusters <= 2**16:
         raise FormatError(f"expected a lattice of at most {MOST_CELLS} cells and a LUT of at most 65536 entries")
@@ -192,22 +143,11 @@ def _from_cells(reader: _Reader, known: dict[str, Any]) -> SomManBrdf:
     lattice = Lattice(theta_h, theta_d, phi_d, bool(reciprocal))
     above = lattice.above_horizon
     entry = np.dtype("<u1" if clusters <= 256 else "<u2")
-    payload = _inflated(reader.rest(), 24 * clusters + entry.itemsize * int(above.sum()))
+    payload = container.inflated(reader.rest(), 24 * clusters + entry.itemsize * int(above.sum()))
     lut = np.frombuffer(payload, "<f8", 3 * clusters).reshape(clusters, 3)
     index: NDArray[Any] = np.zeros(lattice.shape, entry)
     index[above] = np.frombuffer(payload, entry, offset=24 * clusters)
     return SomManBrdf(lut, index, lattice, interpolation=INTERPOLATIONS[interpolation], **known)
-
-
-def _inflated(compressed: bytes, expected: int) -> bytes:
-    """Exactly `expected` bytes, and never more than that in memory."""
-    inflater = zlib.decompressobj(-zlib.MAX_WBITS)
-    payload = inflater.decompress(compressed, expected)
-    if len(payload) == expected and not inflater.eof:
-        payload += inflater.decompress(inflater.unconsumed_tail, 1)
-    if len(payload) != expected or not inflater.eof or inflater.unused_data:
-        raise FormatError(f"expected {expected} bytes of LUT and index, found another number")
-    return payload
 
 
 def _nodes(material: SomManBrdf) -> bytes:
@@ -222,7 +162,7 @@ def _nodes(material: SomManBrdf) -> bytes:
         raise FormatError(f"{material.name}: {error}") from error
 
 
-def _from_nodes(reader: _Reader, known: dict[str, Any]) -> SomManBrdf:
+def _from_nodes(reader: Reader, known: dict[str, Any]) -> SomManBrdf:
     (scale,) = reader.unpack(NODES_HEAD)
     palette, (gain, shape) = _core.NodePalette.decode(reader.rest())
     axes = (tuple(map(tuple, axis)) for axis in (palette.theta_d, palette.phi_d))

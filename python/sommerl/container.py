@@ -1,0 +1,117 @@
+"""What material files of our own share: how they begin, how they say that they are damaged, how their text is stored.
+
+    bytes  what
+    4      magic
+    2      version
+    4      CRC-32 of all that follows
+    …      the body
+
+All numbers are little-endian.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from .brdf import Brdf
+from .errors import FormatError, SommerlError
+from .formats.names import visible
+
+PREFIX = struct.Struct("<4sHI")
+BYTE = struct.Struct("<B")
+LONGEST_NAME = 2**8 - 1
+DIGEST_BYTES = 32
+
+Material = TypeVar("Material", bound=Brdf)
+
+
+def sealed(magic: bytes, version: int, body: bytes) -> bytes:
+    """A whole file around its body."""
+    return PREFIX.pack(magic, version, zlib.crc32(body)) + body
+
+
+def opened(data: bytes, magic: bytes, version: int, kind: str) -> Reader:
+    """A reader of the body. Raises FormatError for another kind of file, another version, or a damaged file."""
+    if len(data) < PREFIX.size:
+        raise FormatError(f"expected at least {PREFIX.size} bytes, found {len(data)}")
+    found_magic, found_version, crc = PREFIX.unpack_from(data)
+    if found_magic != magic:
+        raise FormatError(f"expected a {kind}, found another kind")
+    if found_version != version:
+        hint = "a newer Sommerl may read it" if found_version > version else "make it from its source again"
+        raise FormatError(f"expected version {version}, found version {found_version}; {hint}")
+    if zlib.crc32(data[PREFIX.size :]) != crc:
+        raise FormatError("expected the checksum in the file, found another: the file is damaged or cut off")
+    return Reader(data, PREFIX.size)
+
+
+def load(path: str | Path, longest: int, decode: Callable[[bytes], Material]) -> Material:
+    """What `decode` makes of a file of at most `longest` bytes; its errors name the file."""
+    path = Path(path)
+    length = path.stat().st_size
+    if length > longest:
+        raise FormatError(f"{path}: expected at most {longest} bytes, found {length}")
+    try:
+        material = decode(path.read_bytes())
+    except SommerlError as error:
+        raise FormatError(f"{path}: {error}") from error
+    material.name = visible(material.name)
+    return material
+
+
+def origin(name: str, source_sha256: str) -> bytes:
+    """The name in UTF-8 and the SHA-256 of the source, each after its length; a source may have none."""
+    text = name.encode("utf-8", "replace")[:LONGEST_NAME].decode("utf-8", "ignore").encode()
+    digest = bytes.fromhex(source_sha256)
+    if len(digest) not in (0, DIGEST_BYTES):
+        raise FormatError(f"{name}: expected a digest of {DIGEST_BYTES} bytes, found {len(digest)}")
+    return bytes([len(text)]) + text + bytes([len(digest)]) + digest
+
+
+def deflated(payload: bytes) -> bytes:
+    """A deflate stream (RFC 1951, without zlib's head)."""
+    packer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS, 9)
+    return packer.compress(payload) + packer.flush()
+
+
+def inflated(compressed: bytes, expected: int) -> bytes:
+    """Exactly `expected` bytes, and never more than that in memory."""
+    inflater = zlib.decompressobj(-zlib.MAX_WBITS)
+    payload = inflater.decompress(compressed, expected)
+    if len(payload) == expected and not inflater.eof:
+        payload += inflater.decompress(inflater.unconsumed_tail, 1)
+    if len(payload) != expected or not inflater.eof or inflater.unused_data:
+        raise FormatError(f"expected a stream of {expected} bytes, found another number")
+    return payload
+
+
+class Reader:
+    """Bytes, one part after the other. Raises FormatError where there are too few."""
+
+    def __init__(self, data: bytes, at: int) -> None:
+        self._data, self._at = data, at
+
+    def take(self, count: int) -> bytes:
+        part = self._data[self._at : self._at + count]
+        if len(part) != count:
+            raise FormatError(f"expected {count} more bytes, found {len(part)}")
+        self._at += count
+        return part
+
+    def unpack(self, layout: struct.Struct) -> tuple[Any, ...]:
+        return layout.unpack(self.take(layout.size))
+
+    def origin(self) -> dict[str, str]:
+        """Name and digest, as `origin` wrote them."""
+        name = self.take(*self.unpack(BYTE)).decode()
+        (digest,) = self.unpack(BYTE)
+        if digest not in (0, DIGEST_BYTES):
+            raise FormatError(f"expected a digest of 0 or {DIGEST_BYTES} bytes, found {digest}")
+        return {"name": name, "source_sha256": self.take(digest).hex()}
+
+    def rest(self) -> bytes:
+        return self._data[self._at :]

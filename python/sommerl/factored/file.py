@@ -1,0 +1,84 @@
+"""Files of factored BRDFs (.fbrdf), format 1: docs/format.md has every byte.
+
+The body, after what `container` writes:
+
+    bytes  what
+    1, …   length of the name, and the name in UTF-8
+    1, …   32 and the SHA-256 of the source, or 0
+    1, 1   J, K
+    …      a deflate stream: F, u and v in half precision, all their low bytes before all their high ones; the scales
+           in single precision
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+from .. import container
+from ..container import Reader
+from ..errors import FormatError, SommerlError
+from ..files import atomic_write
+from .fit import MOST
+from .material import COLUMNS, ELEVATIONS, ROWS, FactoredBrdf
+
+MAGIC = b"FBRD"
+VERSION = 1
+TERMS = struct.Struct("<BB")
+LONGEST_FILE = 2**20
+
+
+def looks_like(head: bytes) -> bool:
+    """Whether a file that starts with these bytes says that it is a factored BRDF."""
+    return head.startswith(MAGIC)
+
+
+def save(material: FactoredBrdf, path: str | Path) -> int:
+    """Writes a file; returns its length [bytes]."""
+    data = encode(material)
+    with atomic_write(Path(path)) as out:
+        out.write(data)
+    return len(data)
+
+
+def load(path: str | Path) -> FactoredBrdf:
+    """The factored BRDF in a file. Raises FormatError if it is not one, or is damaged, or is of another version."""
+    return container.load(path, LONGEST_FILE, decode)
+
+
+def encode(material: FactoredBrdf) -> bytes:
+    """The bytes of a file. The same material always gives the same bytes."""
+    halves = np.concatenate([part.reshape(-1) for part in (material.lobes, material.rows, material.columns)])
+    planes = halves.astype("<f2").view(np.uint8).reshape(-1, 2).T
+    stream = container.deflated(planes.tobytes() + material.scale.astype("<f4").tobytes())
+    head = container.origin(material.name, material.source_sha256) + TERMS.pack(*material.terms)
+    return container.sealed(MAGIC, VERSION, head + stream)
+
+
+def decode(data: bytes) -> FactoredBrdf:
+    """The factored BRDF in the bytes of a file. Raises FormatError."""
+    reader = container.opened(data, MAGIC, VERSION, "factored BRDF (.fbrdf)")
+    try:
+        return _material(reader)
+    except FormatError:
+        raise
+    except (ValueError, zlib.error, SommerlError) as error:
+        raise FormatError(f"expected a factored BRDF's header and contents, found others ({error})") from error
+
+
+def _material(reader: Reader) -> FactoredBrdf:
+    origin = reader.origin()
+    lobes, terms = map(int, reader.unpack(TERMS))
+    if not (1 <= lobes <= MOST and 1 <= terms <= MOST):
+        raise FormatError(f"expected 1 to {MOST} lobes and terms, found {lobes} and {terms}")
+    shapes = (ELEVATIONS, lobes, 3), (ROWS, lobes, terms), (COLUMNS, lobes, terms)
+    sizes = [int(np.prod(shape)) for shape in shapes]
+    payload = container.inflated(reader.rest(), 2 * sum(sizes) + 4 * lobes * terms)
+    planes = np.frombuffer(payload, np.uint8, 2 * sum(sizes)).reshape(2, -1)
+    halves = np.ascontiguousarray(planes.T).view("<f2").reshape(-1)
+    parts = np.split(halves, np.cumsum(sizes)[:-1])
+    scale = np.frombuffer(payload, "<f4", offset=2 * sum(sizes)).reshape(lobes, terms)
+    return FactoredBrdf(*(part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)), scale, **origin)

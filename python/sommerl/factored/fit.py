@@ -1,0 +1,125 @@
+"""Factorisation of a BRDF into products of small tables."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..brdf import Brdf
+from ..errors import OptionError
+from ..half_diff import spherical
+from ..optional import optional
+from .material import COLUMNS, ELEVATIONS, LEAST_COSINE, PI, ROWS, FactoredBrdf
+
+MOST = 32  # lobes, and terms of a lobe
+FIRST_ITERATIONS, ITERATIONS = 200, 60
+DARK = 1e-4  # of the largest value: what is darker does not count more
+TINY = 1e-300  # added to divisors that may be 0
+
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FactorOptions:
+    """lobes: J. terms: K, of each lobe. Raises OptionError out of range."""
+
+    lobes: int = 16
+    terms: int = 4
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not 1 <= value <= MOST:
+                raise OptionError(f"{name}: expected 1 to {MOST}, found {value}")
+
+
+def factor(brdf: Brdf, options: FactorOptions | None = None) -> FactoredBrdf:
+    """Factors a BRDF, which is evaluated for 138,240 pairs of directions.
+
+    As Lawrence et al. (2004) do, the matrix of elevations by half vectors is factored first, then each lobe's table of
+    θ_h by φ_h, with rows and columns scaled so that the dark ones count. The iterations after it are our own: they fit
+    all factors together, to what is above the horizon. Raises MissingDependencyError without scikit-learn.
+    """
+    options = options or FactorOptions()
+    data, above = _measured(brdf)
+    rows, columns = _scales(data)
+    f, g = _nmf(data * rows * columns, options.lobes)
+    f, g = f / rows, g / columns
+    lobes = [_split(lobe, options.terms) for lobe in g.reshape(-1, ROWS, COLUMNS)]
+    u, v = (np.stack(parts, axis=1) for parts in zip(*lobes, strict=True))
+    f, u, v = _refined(data, above * (rows * columns) ** 2, f, u, v)
+    tops = [part.max(axis=0) for part in (f, u, v)]
+    f, u, v = (part / np.where(top > 0, top, 1.0) for part, top in zip((f, u, v), tops, strict=True))
+    by_lobe = np.moveaxis(f.reshape(ELEVATIONS, 3, -1), 1, 2)
+    scale = tops[0][:, None] * tops[1] * tops[2]
+    sha256 = getattr(brdf, "source_sha256", None) or ""
+    return FactoredBrdf(by_lobe, u, v, scale, name=brdf.name, source_sha256=sha256)
+
+
+def _measured(brdf: Brdf) -> tuple[Matrix, Matrix]:
+    """f_r max(cos θ_i, C) in the middles of all intervals, and 1 where the light is above the horizon, else 0: shape
+    (ELEVATIONS · 3, ROWS · COLUMNS)."""
+    theta_h = ((np.arange(ROWS) + 0.5) / ROWS) ** 2 * PI / 2
+    phi_h = (np.arange(COLUMNS) + 0.5) / COLUMNS * PI
+    theta_o = (np.arange(ELEVATIONS) + 0.5) / ELEVATIONS * PI / 2
+    theta_o, theta_h, phi_h = np.broadcast_arrays(theta_o[:, None, None], theta_h[:, None], phi_h)
+    h = np.stack(spherical(theta_h, phi_h), axis=-1)
+    wo = np.stack(spherical(theta_o, np.zeros_like(theta_o)), axis=-1)
+    wi = 2 * (h * wo).sum(axis=-1, keepdims=True) * h - wo
+    above = wi[..., 2] > 0
+    values = brdf.eval(wi, wo) * np.maximum(wi[..., 2:], LEAST_COSINE)
+    # Below the horizon, the last value above it at the same φ_h: an edge to 0 would cost terms.
+    last = np.maximum.accumulate(np.where(above, np.arange(ROWS)[:, None], 0), axis=1)
+    filled = np.take_along_axis(values, last[..., None], axis=1)
+    shape = 3 * ELEVATIONS, ROWS * COLUMNS
+    return np.moveaxis(filled, -1, 1).reshape(shape), np.repeat(above, 3, axis=0).reshape(shape).astype(np.float64)
+
+
+def _scales(data: Matrix) -> tuple[Matrix, Matrix]:
+    """Factors for the rows and for the columns, whose means are then alike; 1 for all of black data."""
+    least = DARK * data.max() or 1.0
+    columns = 1 / np.maximum(data.mean(axis=0, keepdims=True), least)
+    return 1 / np.maximum((data * columns).mean(axis=1, keepdims=True), DARK), columns
+
+
+def _nmf(matrix: Matrix, rank: int) -> tuple[Matrix, Matrix]:
+    """Non-negative factors (n, rank) and (rank, m) of a matrix (n, m)."""
+    decomposition = optional("sklearn.decomposition", "scikit-learn", "factorisation", "fit")
+    model = decomposition.NMF(rank, init="nndsvda", max_iter=FIRST_ITERATIONS, tol=1e-5, random_state=0)
+    with warnings.catch_warnings():
+        # It has not converged by then, and need not: it is where `_refined` starts.
+        warnings.filterwarnings("ignore", "Maximum number of iterations")
+        return model.fit_transform(matrix), model.components_
+
+
+def _split(lobe: Matrix, terms: int) -> tuple[Matrix, Matrix]:
+    """u (ROWS, K) and v (COLUMNS, K) of one lobe's table."""
+    scale = 1 / np.maximum(lobe.mean(axis=1, keepdims=True), DARK * lobe.mean() or 1.0)
+    u, v = _nmf(lobe * scale, terms)
+    return u / scale, v.T
+
+
+def _refined(data: Matrix, weights: Matrix, f: Matrix, u: Matrix, v: Matrix) -> tuple[Matrix, Matrix, Matrix]:
+    """Multiplicative updates (Lee & Seung 2001) of each factor in turn, for the weighted squared error."""
+    target = weights * data
+
+    def gradients(f: Matrix, u: Matrix, v: Matrix) -> tuple[Matrix, Matrix]:
+        """Of G, the part of the data and that of the present factors: shape (J, ROWS, COLUMNS)."""
+        now = weights * (f @ _lobes(u, v))
+        return (f.T @ target).reshape(-1, ROWS, COLUMNS), (f.T @ now).reshape(-1, ROWS, COLUMNS)
+
+    for _ in range(ITERATIONS):
+        g = _lobes(u, v)
+        f = f * (target @ g.T) / ((weights * (f @ g)) @ g.T + TINY)
+        up, down = gradients(f, u, v)
+        u = u * np.einsum("jrc,cjk->rjk", up, v) / (np.einsum("jrc,cjk->rjk", down, v) + TINY)
+        up, down = gradients(f, u, v)
+        v = v * np.einsum("jrc,rjk->cjk", up, u) / (np.einsum("jrc,rjk->cjk", down, u) + TINY)
+    return f, u, v
+
+
+def _lobes(u: Matrix, v: Matrix) -> Matrix:
+    """G, (J, ROWS · COLUMNS)."""
+    return np.einsum("rjk,cjk->jrc", u, v).reshape(u.shape[1], -1)
