@@ -1,21 +1,18 @@
-"""Pictures of data."""
+"""Where samples were measured, and where not."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .arrays import split
-from .files import atomic_write
-from .formats.scattered import REACH, ScatteredTable
-from .half_diff import half_diff, spherical
-from .optional import optional
-from .render.compare import Comparison
+from ..arrays import split
+from ..formats.scattered import REACH, ScatteredTable
+from ..half_diff import half_diff, spherical
+from ..optional import optional
+from .page import save
 
-COLUMNS = 6  # of a sheet of spheres
 INCIDENCES = (10, 45, 75)  # degrees
 
 
@@ -32,33 +29,7 @@ def coverage(table: ScatteredTable, path: Path) -> None:
     _slices(figure.add_subplot(1, 4, 1), table)
     for k, incidence in enumerate(INCIDENCES):
         _hemisphere(figure.add_subplot(1, 4, k + 2, projection="polar"), table, incidence)
-    with atomic_write(path) as out:
-        figure.savefig(out, format="png", dpi=110)
-
-
-def fits(name: str, models: Sequence[str], comparisons: Sequence[Comparison], path: Path) -> None:
-    """Writes a PNG: a material on a sphere, its fits with their PSNR over the object, and below each the differences,
-    eight times enlarged.
-
-    comparisons: of `compare_on_sphere`, one a model. Raises MissingDependencyError without matplotlib.
-    """
-    figures = optional("matplotlib.figure", "matplotlib", "plots", "fit")
-    cells = [(name, [comparisons[0].pictures()[0]])]
-    for model, comparison in zip(models, comparisons, strict=True):
-        cells.append((f"{model}: {comparison.metrics.psnr_object_db:.1f} dB", comparison.pictures()[1:]))
-    columns = min(COLUMNS, len(cells))
-    lines = -(-len(cells) // columns)
-    figure = figures.Figure(figsize=(2.2 * columns, 4.7 * lines), layout="constrained")
-    axes = figure.subplots(2 * lines, columns, squeeze=False)
-    for ax in axes.flat:
-        ax.axis("off")
-    for number, (title, pictures) in enumerate(cells):
-        line, column = divmod(number, columns)
-        axes[2 * line, column].set_title(title, fontsize=8, wrap=True)
-        for below, pixels in enumerate(pictures):
-            axes[2 * line + below, column].imshow(pixels)
-    with atomic_write(path) as out:
-        figure.savefig(out, format="png", dpi=110)
+    save(figure, path)
 
 
 def _slices(ax: Any, table: ScatteredTable) -> None:

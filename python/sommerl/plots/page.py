@@ -1,0 +1,93 @@
+"""What pictures share: names, colours, the √θ_h axis, and how a figure is written."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..brdf import Brdf
+from ..errors import MaterialError, OptionError
+from ..files import atomic_write
+from ..optional import optional
+
+Material = tuple[str, Brdf]  #: and its name
+Materials = Brdf | Mapping[str, Brdf]  #: a material, or several by the names that a legend gives them
+
+DPI = 110
+LONGEST_NAME = 60
+THETA_H_TICKS = (0, 1, 5, 15, 30, 50, 90)  # degrees, on an axis of √θ_h
+# Extensions, and what is left out: when, and with which version of matplotlib, a file was written.
+FORMATS: dict[str, dict[str, None]] = {
+    ".png": {"Software": None},
+    ".pdf": {"Creator": None, "Producer": None, "CreationDate": None},
+    ".svg": {"Creator": None, "Date": None},
+}
+STYLES = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 2, 1, 2)), (0, (9, 2)))  # of lines, one a material
+MOST_MATERIALS = len(STYLES)
+
+
+def matplotlib(module: str = "matplotlib.figure") -> Any:
+    """A module of matplotlib. Raises MissingDependencyError without it."""
+    return optional(module, "matplotlib", "plots", "formats")
+
+
+@contextmanager
+def plain_style() -> Generator[None]:
+    """Matplotlib as it comes, whatever the user's settings: same input, same picture."""
+    library = matplotlib("matplotlib")
+    with library.rc_context(), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing")  # names may be in any script
+        library.rcdefaults()
+        library.rcParams["svg.hashsalt"] = "sommerl"  # else the names inside an SVG file are random
+        yield
+
+
+def save(figure: Any, path: Path) -> None:
+    """Writes a figure as PNG, PDF or SVG, by the extension; the same figure gives the same bytes.
+
+    Raises OptionError for another extension, OSError if it cannot be written.
+    """
+    extension = path.suffix.lower()
+    if extension not in FORMATS:
+        raise OptionError(f"{path}: expected a name that ends in {' or '.join(FORMATS)}, found {path.suffix!r}")
+    with plain_style(), atomic_write(path) as out:
+        figure.savefig(out, format=extension[1:], dpi=DPI, metadata=FORMATS[extension])
+
+
+def named(brdf: Materials) -> list[Material]:
+    """Materials with their names. Raises MaterialError if there are none, or more than line styles."""
+    found = [(brdf.name, brdf)] if isinstance(brdf, Brdf) else list(brdf.items())
+    if not 1 <= len(found) <= MOST_MATERIALS:
+        raise MaterialError(f"materials: expected 1 to {MOST_MATERIALS} in a picture, found {len(found)}")
+    return found
+
+
+def text(name: str) -> str:
+    """A name as matplotlib shows it: a dollar is no formula, and no legend leaves it out for its first letter."""
+    short = name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1] + "…"
+    return ("\u200b" if short.startswith("_") else "") + short.replace("$", r"\$")
+
+
+def number(value: float) -> str:
+    """Three digits, without an exponent."""
+    return np.format_float_positional(value, 3, unique=False, fractional=False, trim="-")
+
+
+def colours(count: int) -> list[Any]:
+    """Colours of an increasing angle, dark to light, all readable on white."""
+    return list(matplotlib("matplotlib").colormaps["viridis"](np.linspace(0, 0.85, count)))
+
+
+def legend(ax: Any, materials: list[Material], angles: list[str], **where: Any) -> None:
+    """Says which colour is which angle and, of several materials, which line is whose."""
+    line = matplotlib("matplotlib.lines").Line2D
+    handles = [line([], [], color=c, label=label) for c, label in zip(colours(len(angles)), angles, strict=True)]
+    if len(materials) > 1:
+        for (name, _), style in zip(materials, STYLES, strict=False):
+            handles.append(line([], [], color="black", linestyle=style, label=text(name)))
+    ax.legend(handles=handles, fontsize=7, handlelength=2.8, **where)
