@@ -1,0 +1,55 @@
+"""How often each cell of a lattice is hit by directions in natural coordinates (Kurt & Cinsdikici 2008, Fig. 2)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..brdf import Brdf, OnLattice
+from ..errors import MaterialError
+from ..half_diff import TWO_PI, half_diff, spherical
+from ..lattice import HALF_PI, Lattice
+
+THETA_STEPS, PHI_STEPS = 90, 180  # of each direction: 1° and 2°
+
+
+def hit_counts(lattice: Lattice) -> NDArray[np.int64]:
+    """How many of the paper's 90 × 180 × 90 × 180 pairs (θ_i, φ_i, θ_o, φ_o) fall into each cell.
+
+    Of the lattice's shape; they add up to 262,440,000. The paper does not say where in its steps of 1° in θ and 2° in φ
+    directions lie; here in the middle, as at θ = 0 all φ are the same direction. A lattice of isotropic materials knows
+    φ_o − φ_i alone, of which each value occurs 180 times: one φ_i stands for all.
+    """
+    theta = (np.arange(THETA_STEPS) + 0.5) * (HALF_PI / THETA_STEPS)
+    phi = np.arange(PHI_STEPS) * (TWO_PI / PHI_STEPS)
+    found = np.zeros(lattice.size, np.int64)
+    for theta_i in theta:
+        theta_o, phi_o = np.meshgrid(theta, phi, indexing="ij")
+        wi = spherical(np.full_like(theta_o, theta_i), np.zeros_like(phi_o))
+        cell = lattice.cell(*half_diff(wi, spherical(theta_o, phi_o), lattice.reciprocal))
+        found += np.bincount(cell.reshape(-1), minlength=lattice.size)
+    return PHI_STEPS * found.reshape(lattice.shape)
+
+
+def hits(ax: Any, material: Brdf) -> None:
+    """Draws the paper's Fig. 2: how often cells are hit if directions are taken in natural coordinates, over the number
+    of the cell. Many are never hit, which is why the paper compresses.
+
+    It depends on the lattice, not on the material. A bar is a row of cells of equal θ_h and θ_d (180 in φ_d, in MERL's
+    lattice); the bars add up to all pairs. See `hit_counts`. Raises MaterialError for a material without cells.
+    """
+    lattice = material.grid if isinstance(material, OnLattice) else None
+    if lattice is None:
+        raise MaterialError(f"{material.name}: expected a material on a lattice of cells, found one without")
+    counts = hit_counts(lattice)
+    rows = counts.sum(axis=2).reshape(-1)
+    ax.stairs(rows, np.arange(len(rows) + 1) * lattice.phi_d, fill=True, color="C0")
+    ax.set(xlim=(0, lattice.size), ylim=(0, None), xlabel="number of the cell", ylabel=f"hits in {lattice.phi_d} cells")
+    ax.locator_params(axis="x", nbins=5)
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_formatter("{x:,.0f}")
+    ax.set_title(
+        f"{' × '.join(map(str, lattice.shape))} cells, {(counts > 0).mean():.1%} are hit (as the paper's Fig. 2)"
+    )
