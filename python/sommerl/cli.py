@@ -13,7 +13,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, NoReturn, get_args
 
-from . import __version__, commands, convert, demo
+from . import __version__, commands, convert, demo, plots
 from .errors import OptionError, SommerlError
 from .fitting.options import MOST_LOBES, FitOptions, Loss, Sampling
 from .lattice import INTERPOLATIONS
@@ -104,7 +104,7 @@ def _parser() -> Parser:
     )
     parser.add_argument("--version", action="version", version=f"sommerl {__version__}")
     add = parser.add_subparsers(metavar="COMMAND", required=True, dest="command").add_parser
-    for build in (_demo, _compress, _info, _convert, _compare, _fit, _render, _paper):
+    for build in (_demo, _compress, _info, _convert, _compare, _fit, _render, _plot, _paper):
         build(add)
     return parser
 
@@ -245,6 +245,27 @@ def _render(add: Any) -> None:
         help="how directions to the light are drawn; all give the same image, with more or less noise (%(default)s)",
     )
     _rendering(command)
+
+
+def _plot(add: Any) -> None:
+    summary = "Draws what a material is: lobes, slices, palette."
+    example = """sommerl plot nickel.binary -o nickel.png
+  sommerl plot nickel.binary nickel.smrl nickel.json:ggx --kind theta-h -o three.pdf"""
+    command = _command(add, "plot", commands.plot, summary, example)
+    kinds = "\n".join(f"  {name:10}{kind.shows}" for name, kind in plots.KINDS.items())
+    command.epilog = f"Kinds:\n{kinds}\n\n{command.epilog}"
+    command.add_argument(
+        "materials", nargs="+", metavar="MATERIAL", help=f"up to {plots.MOST_MATERIALS}; curves are drawn together"
+    )
+    command.add_argument(
+        "-o", "--output", type=Path, required=True, help=f"a name that ends in {' '.join(plots.FORMATS)}"
+    )
+    command.add_argument(
+        "--kind",
+        choices=[*plots.KINDS, "all"],
+        default="all",
+        help="one of those below, or all that apply (%(default)s)",
+    )
 
 
 def _fit(add: Any) -> None:

@@ -253,6 +253,34 @@ def render(options: Namespace) -> dict[str, Any]:
     }
 
 
+def plot(options: Namespace) -> dict[str, Any]:
+    for source in options.materials:
+        check_output(options.output, tuple(plots.FORMATS), source)
+    if len(options.materials) > plots.MOST_MATERIALS:
+        raise OptionError(f"materials: expected 1 to {plots.MOST_MATERIALS}, found {len(options.materials)}")
+    materials = _by_name(options.materials)
+    figure, kinds = plots.sheet(materials, options.kind)
+    plots.save(figure, options.output)
+    if not options.json:
+        print(f"{', '.join(materials)} → {options.output} ({', '.join(kinds)})")
+    return {"image": str(options.output), "kinds": kinds, "materials": list(materials)}
+
+
+def _by_name(sources: list[str]) -> dict[str, Brdf]:
+    """Materials by their names; by name and source where that is the same, as of a table and what was made of it."""
+    again = next((source for source in sources if sources.count(source) > 1), None)
+    if again:
+        raise OptionError(f"materials: expected different ones, found {again} twice")
+    found = [(source, load(source)) for source in sources]
+    names = [brdf.name for _, brdf in found]
+    result: dict[str, Brdf] = {}
+    for source, brdf in found:
+        alone = names.count(brdf.name) == 1 or brdf.name.startswith(source)  # a built-in one's says where it is from
+        name = brdf.name if alone else f"{Path(source).name}: {brdf.name}"
+        result[f"{source}: {brdf.name}" if name in result else name] = brdf
+    return result
+
+
 def _alike(reference: Brdf, candidate: Brdf, asked: Any) -> tuple[Brdf, Brdf]:
     """Both, looked up as asked; else a table as the SOM-MAN material on its lattice, so that like meets like."""
 
