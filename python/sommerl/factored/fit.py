@@ -15,7 +15,8 @@ from ..optional import optional
 from .material import COLUMNS, ELEVATIONS, LEAST_COSINE, PI, ROWS, FactoredBrdf
 
 MOST = 32  # lobes, and terms of a lobe
-FIRST_ITERATIONS, ITERATIONS = 200, 60
+FIRST_ITERATIONS, ITERATIONS = 200, 100
+BELOW = 0.01  # weight of half vectors that mirror the viewer below the horizon
 DARK = 1e-4  # of the largest value: what is darker does not count more
 TINY = 1e-300  # added to divisors that may be 0
 
@@ -40,16 +41,17 @@ def factor(brdf: Brdf, options: FactorOptions | None = None) -> FactoredBrdf:
 
     As Lawrence et al. (2004) do, the matrix of elevations by half vectors is factored first, then each lobe's table of
     θ_h by φ_h, with rows and columns scaled so that the dark ones count. The iterations after it are our own: they fit
-    all factors together, to what is above the horizon. Raises MissingDependencyError without scikit-learn.
+    all factors together. What is below the horizon, which no evaluation reads, is to be 0, so that sampling does not
+    draw it, but counts little, so that it costs no accuracy. Raises MissingDependencyError without scikit-learn.
     """
     options = options or FactorOptions()
-    data, above = _measured(brdf)
+    data, above = _light(brdf)
     rows, columns = _scales(data)
     f, g = _nmf(data * rows * columns, options.lobes)
     f, g = f / rows, g / columns
     lobes = [_split(lobe, options.terms) for lobe in g.reshape(-1, ROWS, COLUMNS)]
     u, v = (np.stack(parts, axis=1) for parts in zip(*lobes, strict=True))
-    f, u, v = _refined(data, above * (rows * columns) ** 2, f, u, v)
+    f, u, v = _refined(data, np.where(above, 1.0, BELOW) * (rows * columns) ** 2, f, u, v)
     tops = [part.max(axis=0) for part in (f, u, v)]
     f, u, v = (part / np.where(top > 0, top, 1.0) for part, top in zip((f, u, v), tops, strict=True))
     by_lobe = np.moveaxis(f.reshape(ELEVATIONS, 3, -1), 1, 2)
@@ -58,9 +60,9 @@ def factor(brdf: Brdf, options: FactorOptions | None = None) -> FactoredBrdf:
     return FactoredBrdf(by_lobe, u, v, scale, name=brdf.name, source_sha256=sha256)
 
 
-def _measured(brdf: Brdf) -> tuple[Matrix, Matrix]:
-    """f_r max(cos θ_i, C) in the middles of all intervals, and 1 where the light is above the horizon, else 0: shape
-    (ELEVATIONS · 3, ROWS · COLUMNS)."""
+def _light(brdf: Brdf) -> tuple[Matrix, NDArray[np.bool_]]:
+    """f_r max(cos θ_i, C) in the middles of all intervals, 0 where the light is below the horizon, and where it is not:
+    shape (ELEVATIONS · 3, ROWS · COLUMNS)."""
     theta_h = ((np.arange(ROWS) + 0.5) / ROWS) ** 2 * PI / 2
     phi_h = (np.arange(COLUMNS) + 0.5) / COLUMNS * PI
     theta_o = (np.arange(ELEVATIONS) + 0.5) / ELEVATIONS * PI / 2
@@ -68,13 +70,9 @@ def _measured(brdf: Brdf) -> tuple[Matrix, Matrix]:
     h = np.stack(spherical(theta_h, phi_h), axis=-1)
     wo = np.stack(spherical(theta_o, np.zeros_like(theta_o)), axis=-1)
     wi = 2 * (h * wo).sum(axis=-1, keepdims=True) * h - wo
-    above = wi[..., 2] > 0
     values = brdf.eval(wi, wo) * np.maximum(wi[..., 2:], LEAST_COSINE)
-    # Below the horizon, the last value above it at the same φ_h: an edge to 0 would cost terms.
-    last = np.maximum.accumulate(np.where(above, np.arange(ROWS)[:, None], 0), axis=1)
-    filled = np.take_along_axis(values, last[..., None], axis=1)
     shape = 3 * ELEVATIONS, ROWS * COLUMNS
-    return np.moveaxis(filled, -1, 1).reshape(shape), np.repeat(above, 3, axis=0).reshape(shape).astype(np.float64)
+    return np.moveaxis(values, -1, 1).reshape(shape), np.repeat(wi[..., 2] > 0, 3, axis=0).reshape(shape)
 
 
 def _scales(data: Matrix) -> tuple[Matrix, Matrix]:

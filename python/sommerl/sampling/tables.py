@@ -11,7 +11,7 @@ from ..arrays import Array, ops
 
 
 def cumulative(light: NDArray[np.float64], even: NDArray[np.float64], floor: float) -> NDArray[np.float32]:
-    """The CDFs along the last axis, from 0 to 1, of `light` with a share `floor` of `even`; of `even` alone if black."""
+    """The CDFs along the last axis, from 0 to 1, of `light` and a share `floor` of `even`; of `even` alone if black."""
     total = light.sum(axis=-1, keepdims=True)
     share = np.where(total > 0, light / np.where(total > 0, total, 1.0), even)
     cdf = np.cumsum((1 - floor) * share + floor * even, axis=-1)
