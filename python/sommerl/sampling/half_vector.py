@@ -38,7 +38,7 @@ WHOLE = CELLS * SLOTS  # the probability 1
 SMALLEST = 1e-35  # solid angle of a direction that is drawn, times its density in the unit square
 TINY = 1e-9  # added to lengths along x, so that the azimuth of the normal itself is defined
 LOWEST = 1e-4  # cos θ_o of the table's lowest elevation, 0 but for numbers that need some width
-DIFFUSE = 0.03  # share of directions that follow the cosine
+DIFFUSE = 0.01  # share of directions that follow the cosine
 FINER = 3  # places looked at along each side of a cell
 NEIGHBOUR = 0.07  # a cell gets at least that share of the brightest light in and about it, which bounds weights
 

@@ -35,7 +35,7 @@ from ..half_diff import TWO_PI
 from .sampler import PI, Sampler
 from .tables import cumulative, inverted
 
-DIFFUSE = 0.03  # share of directions that follow the cosine, as in ours
+DIFFUSE = 0.01  # share of directions that follow the cosine, as in ours
 
 
 @dataclass(frozen=True)
