@@ -15,6 +15,7 @@ from typing import Any, NoReturn, get_args
 
 from . import __version__, commands, convert, demo, plots
 from .errors import OptionError, SommerlError
+from .factored.fit import FactorOptions
 from .fitting.options import MOST_LOBES, FitOptions, Loss, Sampling
 from .lattice import INTERPOLATIONS
 from .materials import NAMES
@@ -25,15 +26,15 @@ from .sampling.named import OURS, SAMPLERS
 from .som_man.budget import DEFAULT_PSNR, LARGEST_SIZE, SMALLEST_SIZE
 from .som_man.options import Order, Rule, Topology, TrainOptions
 
-TRAIN_DEFAULTS, FIT_DEFAULTS = TrainOptions(), FitOptions()
+TRAIN_DEFAULTS, FIT_DEFAULTS, FACTOR_DEFAULTS = TrainOptions(), FitOptions(), FactorOptions()
 
 DESCRIPTION = """\
 Turns measured reflectance into small material files that render fast and look like the measurement.
 
-A MATERIAL is a file, told by its content, or the name of a built-in one. Files: Sommerl's .smrl, MERL .binary,
-RGL .bsdf (isotropic), Cornell .brdf, tables of samples (.csv .npy .npz, with columns theta_i_deg, phi_i_deg,
-theta_o_deg, phi_o_deg, r, g, b), neural BRDFs (.npy .npz .h5; of an archive with several, FILE.npz:NAME), and
-fits (.json; of several, FILE.json:MODEL)."""
+A MATERIAL is a file, told by its content, or the name of a built-in one. Files: Sommerl's .smrl and .fbrdf, MERL
+.binary, RGL .bsdf (isotropic), Cornell .brdf, tables of samples (.csv .npy .npz, with columns theta_i_deg,
+phi_i_deg, theta_o_deg, phi_o_deg, r, g, b), neural BRDFs (.npy .npz .h5; of an archive with several, FILE.npz:NAME),
+and fits (.json; of several, FILE.json:MODEL)."""
 
 BUILT_IN = "Built-in materials (SGD stand-ins for measured ones):\n  " + "\n  ".join(
     ", ".join(NAMES[i : i + 5]) for i in range(0, len(NAMES), 5)
@@ -104,7 +105,7 @@ def _parser() -> Parser:
     )
     parser.add_argument("--version", action="version", version=f"sommerl {__version__}")
     add = parser.add_subparsers(metavar="COMMAND", required=True, dest="command").add_parser
-    for build in (_demo, _compress, _info, _convert, _compare, _fit, _render, _plot, _paper):
+    for build in (_demo, _compress, _info, _convert, _compare, _fit, _factor, _render, _plot, _paper):
         build(add)
     return parser
 
@@ -307,6 +308,16 @@ def _fit(add: Any) -> None:
     command.add_argument(
         "--picture", type=Path, metavar="FILE", help="a .png of the material, its fits and differences"
     )
+
+
+def _factor(add: Any) -> None:
+    summary = "Factors a material into products of small tables, the representation of Lawrence et al. 2004."
+    command = _command(add, "factor", commands.factor, summary, "sommerl factor nickel.binary -o nickel.fbrdf")
+    command.add_argument("material", metavar="MATERIAL")
+    command.add_argument("-o", "--output", type=Path, required=True, help="a .fbrdf file")
+    for name, text in (("lobes", "J: products of the viewer's elevation and a lobe"), ("terms", "K: of each lobe")):
+        default = getattr(FACTOR_DEFAULTS, name)
+        command.add_argument(f"--{name}", type=int, default=default, metavar="N", help=f"{text} (%(default)s)")
 
 
 def _paper(add: Any) -> None:

@@ -25,6 +25,9 @@ from .describe import (
     trained,
 )
 from .errors import FormatError, MaterialError, MissingDependencyError, OptionError, SommerlError
+from .factored import file as fbrdf
+from .factored.fit import FactorOptions
+from .factored.fit import factor as factored
 from .files import check_writable
 from .fitting.fit import fit as fit_model
 from .fitting.fit import fit_all
@@ -224,6 +227,27 @@ def fit(options: Namespace) -> dict[str, Any]:
     if not options.json:
         print_fits(f"{options.material}: {chosen.loss} error of fits", result["fits"], found)
     return result
+
+
+def factor(options: Namespace) -> dict[str, Any]:
+    chosen = FactorOptions(options.lobes, options.terms)
+    check_output(options.output, (".fbrdf",), options.material)
+    brdf = load(options.material)
+    started = time.perf_counter()
+    material = factored(brdf, chosen)
+    seconds = time.perf_counter() - started
+    written = fbrdf.save(material, options.output)
+    known = describe(material, written)
+    if not options.json:
+        rows = {
+            "lobes × terms": text(known["terms"]),
+            "size in memory": console.size(material.bytes_memory),
+            "size on disk": console.size(written),
+            **fact_rows(known["facts"]),
+            "time": f"{seconds:.1f} s",
+        }
+        console.print_rows(f"{material.name} → {options.output}", rows)
+    return known | {"seconds": seconds, "output": str(options.output)}
 
 
 def render(options: Namespace) -> dict[str, Any]:

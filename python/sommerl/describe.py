@@ -8,6 +8,7 @@ from typing import Any
 
 from . import console
 from .brdf import Brdf, OnLattice
+from .factored.material import FactoredBrdf
 from .fitting.fit import Fit
 from .formats.rgl import RglBrdf
 from .metrics import ImageMetrics, table_metrics
@@ -36,13 +37,18 @@ def trained(table: BrdfTable, options: TrainOptions) -> tuple[SomManBrdf, TrainR
 
 def describe(brdf: Brdf, bytes_disk: int | None) -> dict[str, Any]:
     """What `info` says of a material; null where a kind of material has no such thing."""
-    known: dict[str, Any] = dict.fromkeys(("clusters", "lattice", "nodes", "interpolation", "domain", "bytes_paper"))
+    known: dict[str, Any] = dict.fromkeys(
+        ("clusters", "lattice", "nodes", "interpolation", "domain", "bytes_paper", "terms")
+    )
     known |= dict.fromkeys(("bytes_memory", "options", "metrics", "source_sha256", "cells_clamped", "lobes"))
     kind = "measurement" if isinstance(brdf, RglBrdf) else "model"
     if isinstance(brdf, SomManBrdf):
         kind = "som-man"
         known |= {"clusters": brdf.clusters, "domain": brdf.domain, "bytes_paper": brdf.bytes_paper}
         known |= {"bytes_memory": brdf.bytes_memory, "options": brdf.options, "metrics": brdf.metrics}
+    if isinstance(brdf, FactoredBrdf):
+        kind = "factored"
+        known |= {"terms": list(brdf.terms), "bytes_memory": brdf.bytes_memory}
     if isinstance(brdf, MultiLobe):
         known["lobes"] = [lobe.as_json() for lobe in brdf.lobes]
     if isinstance(brdf, BrdfTable):
@@ -63,7 +69,9 @@ def label(brdf: Brdf) -> str:
 
 def lookup(brdf: Brdf) -> str:
     """How a material is looked up."""
-    return brdf.interpolation if isinstance(brdf, OnLattice) else "formula"
+    if isinstance(brdf, OnLattice):
+        return brdf.interpolation
+    return "factored" if isinstance(brdf, FactoredBrdf) else "formula"
 
 
 def _rounded(value: Any) -> Any:
@@ -71,7 +79,7 @@ def _rounded(value: Any) -> Any:
 
 
 FACTS = {
-    "asymmetry": "asymmetry of the data: |f(a, b) − f(b, a)| over the mean",
+    "asymmetry": "asymmetry: |f(a, b) − f(b, a)| over the mean",
     "reciprocal": "both orders averaged",
     "cells_near_grazing": "MERL cells where a cosine below 0.01 was taken for 0.01",
     "samples": "samples, at different directions",

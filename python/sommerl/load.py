@@ -8,6 +8,7 @@ from pathlib import Path
 
 from .brdf import Brdf, OnLattice
 from .errors import FormatError, MaterialError
+from .factored import file as fbrdf
 from .formats import arrays_on_disk, cornell, fits, merl, nbrdf, rgl, samples
 from .formats.names import split_member
 from .lattice import Interpolation
@@ -17,7 +18,7 @@ from .table import BrdfTable
 
 HEAD_BYTES = 4096
 # What `load` reads.
-EXTENSIONS = (".smrl", ".binary", ".bsdf", ".brdf", ".csv", ".npy", ".npz", ".h5", ".hdf5", ".json")
+EXTENSIONS = (".smrl", ".fbrdf", ".binary", ".bsdf", ".brdf", ".csv", ".npy", ".npz", ".h5", ".hdf5", ".json")
 
 
 def load(source: str | Path) -> Brdf:
@@ -53,6 +54,8 @@ def _read(path: Path, head: bytes, member: str) -> Brdf:
         raise FormatError(f"{path}: expected an archive of materials, to take {member} from it, found one material")
     if smrl.looks_like(head):
         return smrl.load(path)
+    if fbrdf.looks_like(head):
+        return fbrdf.load(path)
     if rgl.looks_like(head):
         return rgl.read(path)
     if head.startswith(nbrdf.HDF5_MAGIC):
@@ -86,8 +89,8 @@ def _named(path: Path) -> Brdf:
     if path.suffix.lower() in reader:
         return reader[path.suffix.lower()](path)
     raise FormatError(
-        f"{path}: expected a material (.smrl, MERL .binary, RGL .bsdf, Cornell .brdf, samples .csv .npy .npz, neural "
-        "BRDF .npy .npz .h5, fits .json), found none of these"
+        f"{path}: expected a material (.smrl, .fbrdf, MERL .binary, RGL .bsdf, Cornell .brdf, samples .csv .npy .npz, "
+        "neural BRDF .npy .npz .h5, fits .json), found none of these"
     )
 
 

@@ -79,6 +79,6 @@ def _material(reader: Reader) -> FactoredBrdf:
     payload = container.inflated(reader.rest(), 2 * sum(sizes) + 4 * lobes * terms)
     planes = np.frombuffer(payload, np.uint8, 2 * sum(sizes)).reshape(2, -1)
     halves = np.ascontiguousarray(planes.T).view("<f2").reshape(-1)
-    parts = np.split(halves, np.cumsum(sizes)[:-1])
+    f, u, v = (part.reshape(shape) for part, shape in zip(np.split(halves, np.cumsum(sizes)[:-1]), shapes, strict=True))
     scale = np.frombuffer(payload, "<f4", offset=2 * sum(sizes)).reshape(lobes, terms)
-    return FactoredBrdf(*(part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)), scale, **origin)
+    return FactoredBrdf(f, u, v, scale, **origin)

@@ -64,13 +64,14 @@ class LawrenceSampler(Sampler):
         bands = _bands()
         mass = factored.scale.reshape(-1) * (u @ bands) * v.sum(axis=1)
         mass = mass if mass.any() else np.ones_like(mass)
-        share = factored.lobes.astype(np.float64).mean(axis=-1)
+        lobes = factored.lobes.astype(np.float64).mean(axis=-1)
+        black = ~(lobes.repeat(factored.terms[1], axis=1) * mass).any(axis=1, keepdims=True)
+        share: NDArray[np.float64] = np.where(black, 1.0, lobes)
         each = share.repeat(factored.terms[1], axis=1) * mass
-        black = ~each.any(axis=1, keepdims=True)
-        share, each = np.where(black, 1.0, share), np.where(black, mass, each)
+        share /= each.sum(axis=1, keepdims=True)
         return cls(
             brdf,
-            (share / each.sum(axis=1, keepdims=True)).astype(np.float32),
+            share.astype(np.float32),
             mass.astype(np.float32),
             cumulative(each, mass, 0.0),
             cumulative(u * bands, bands / bands.sum(), 0.0),

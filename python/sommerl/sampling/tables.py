@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, ops
 
+BELOW_ONE = 1 - 2**-24
+
 
 def cumulative(light: NDArray[np.float64], even: NDArray[np.float64], floor: float) -> NDArray[np.float32]:
     """The CDFs along the last axis, from 0 to 1, of `light` and a share `floor` of `even`; of `even` alone if black."""
@@ -29,6 +31,7 @@ def probability(cdf: Any, index: Array) -> Array:
 def inverted(cdf: Any, start: Array, count: int, u: Array) -> tuple[Array, Array, Array]:
     """The bin of a CDF that begins at `start` that holds u; how far u is in it, from 0 to 1; and its probability."""
     f = ops(u)
+    u = f.minimum(u, BELOW_ONE)  # of numbers that were calculated, rounding may have made a 1
     bin_ = 0 * start
     for bit in reversed(range((count - 1).bit_length())):
         further = bin_ + (1 << bit)
