@@ -99,10 +99,10 @@ def factored(name, options=FEW):
 
 
 def check_lambertian(material, albedo):
-    """Within a percent on average, within a tenth in nine of ten places."""
+    """Within a percent on average, within a tenth almost anywhere but at grazing angles, where f_r is a quotient."""
     found, cosine = material.eval(A, B), A[:, 2:]
     assert (found * cosine).sum() / cosine.sum() / 3 == pytest.approx(albedo / np.pi, rel=0.01)
-    assert np.isclose(found, albedo / np.pi, rtol=0.1).mean() > 0.9
+    assert np.isclose(found[A[:, 2] > 0.3], albedo / np.pi, rtol=0.1).mean() > 0.95
 
 
 def test_chalk_stays_chalk():
