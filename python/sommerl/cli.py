@@ -13,7 +13,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, NoReturn, get_args
 
-from . import __version__, commands, convert, demo, plots
+from . import __version__, commands, convert, demo, plots, rendering
 from .errors import OptionError, SommerlError
 from .factored.fit import FactorOptions
 from .fitting.options import MOST_LOBES, FitOptions, Loss, Sampling
@@ -21,7 +21,8 @@ from .lattice import INTERPOLATIONS
 from .materials import NAMES
 from .models.multi_lobe import FAMILIES
 from .paper import report
-from .render.scenes import DEFAULT_SIZE, DEFAULT_SPP
+from .render.passes import DEFAULT_SIZE, DEFAULT_SPP
+from .render.scenes import STAGES
 from .sampling.named import OURS, SAMPLERS
 from .som_man.budget import DEFAULT_PSNR, LARGEST_SIZE, SMALLEST_SIZE
 from .som_man.options import Order, Rule, Topology, TrainOptions
@@ -227,17 +228,32 @@ def _compare(add: Any) -> None:
 
 
 def _render(add: Any) -> None:
-    summary = "Renders a material. PNG is exposed for the object; EXR is linear."
-    command = _command(
-        add, "render", commands.render, summary, "sommerl render --scene sphere nickel.smrl -o nickel.exr"
+    summary = "Renders materials in a scene. PNG is exposed for the objects; EXR is linear."
+    example = """sommerl render nickel.smrl -o nickel.exr
+  sommerl render --scene statue --mesh buddha.obj blue.smrl --against blue.binary -o blue.png
+  sommerl render --scene grid FOLDER --size 128 -o sheet.png"""
+    command = _command(add, "render", rendering.render, summary, example)
+    command.epilog = f"{rendering.SCENES}\n\n{rendering.FILES}\n\n{command.epilog}"
+    command.add_argument(
+        "materials", nargs="*", metavar="MATERIAL", help="as many as the scene takes; the rest are the scene's own"
     )
-    command.add_argument("material", metavar="MATERIAL")
-    command.add_argument("--scene", choices=["sphere"], default="sphere", help="(%(default)s)")
+    command.add_argument("--scene", choices=[*STAGES, rendering.GRID], default="sphere", help="(%(default)s)")
     command.add_argument("-o", "--output", type=Path, required=True, help="a .png or .exr file")
+    command.add_argument(
+        "--against",
+        action="append",
+        default=[],
+        metavar="REFERENCE",
+        help="render the scene with this material in place of the first MATERIAL, too, and say how far the two are "
+        "apart; given again: in place of the second one, and so on",
+    )
+    command.add_argument(
+        "--mesh", type=Path, metavar="FILE", help="statue: a mesh, .obj or .ply, y up (a built-in one)"
+    )
     command.add_argument(
         "--lookup",
         choices=INTERPOLATIONS,
-        help="how it is looked up (tables: trilinear)",
+        help="how materials are looked up (tables: trilinear; with --against: as `compare` does)",
     )
     command.add_argument(
         "--sampler",

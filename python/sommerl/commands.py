@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from argparse import Namespace
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -35,15 +34,12 @@ from .fitting.options import FitOptions, families_of
 from .formats import fits
 from .formats.names import split_member
 from .load import EXTENSIONS, interpolated, load, load_table
-from .metrics import exposure, table_metrics, to_srgb8
+from .metrics import table_metrics
 from .models.multi_lobe import MultiLobe
 from .render.compare import compare_on_sphere, judge_on_sphere
 from .render.environment import default_environment, load_environment
 from .render.images import side_by_side, write_image
-from .render.llvm import mitsuba
-from .render.scenes import LARGEST_SIZE, sphere
-from .render.scenes import render as render_scene
-from .sampling import named
+from .render.passes import LARGEST_SIZE
 from .som_man import budget
 from .som_man import file as smrl
 from .som_man.budget import CompactOptions
@@ -103,7 +99,7 @@ def _outputs(inputs: list[str], output: Path) -> list[Path]:
     if len(inputs) == 1 and not output.is_dir():
         outputs = [output]
     elif output.is_dir():
-        outputs = [output / f"{_stem(source)}.smrl" for source in inputs]
+        outputs = [output / f"{stem(source)}.smrl" for source in inputs]
     else:
         raise OptionError(f"{output}: expected a folder that exists, for several inputs")
     if len(set(outputs)) < len(outputs):
@@ -113,7 +109,7 @@ def _outputs(inputs: list[str], output: Path) -> list[Path]:
     return outputs
 
 
-def _stem(source: str) -> str:
+def stem(source: str) -> str:
     path, member = split_member(source)
     return member or (path.stem if path.suffix.lower() in EXTENSIONS else path.name)
 
@@ -171,8 +167,9 @@ def info(options: Namespace) -> dict[str, Any]:
 def compare(options: Namespace) -> dict[str, Any]:
     if options.output:
         check_output(options.output, (".png",))
-    reference, candidate = _alike(load(options.reference), load(options.candidate), options.lookup)
-    environment = _environment(options)
+    reference, candidate = alike(load(options.reference), load(options.candidate), options.lookup)
+    check_rendering(options)
+    environment = environment_of(options)
     with console.progress("rendering") as advance:
         comparison = compare_on_sphere(
             reference,
@@ -185,8 +182,7 @@ def compare(options: Namespace) -> dict[str, Any]:
         )[0]
     if options.output:
         write_image(options.output, side_by_side(comparison.pictures()))
-    tables = _sampled(reference, candidate)
-    metrics = asdict(table_metrics(tables[0].values, tables[1].values, tables[0].lattice))
+    metrics = table_distance(reference, candidate)
     result = asdict(comparison.metrics) | {f"table_{name}": value for name, value in metrics.items()}
     result |= {"reference": label(reference), "candidate": label(candidate)}
     if options.output:
@@ -250,33 +246,6 @@ def factor(options: Namespace) -> dict[str, Any]:
     return known | {"seconds": seconds, "output": str(options.output)}
 
 
-def render(options: Namespace) -> dict[str, Any]:
-    check_output(options.output, (".png", ".exr"))
-    brdf = load(options.material)
-    if options.lookup:
-        brdf = interpolated(brdf, options.lookup)
-    environment = _environment(options)
-    started = time.perf_counter()
-    with console.progress("rendering") as advance:
-        sampler = named.fitted(options.sampler, brdf)
-        scene = sphere(brdf, environment, sampler=sampler, size=options.size)
-        image = render_scene(scene, spp=options.spp, seed=options.seed, progress=advance)
-    seconds = time.perf_counter() - started
-    linear = options.output.suffix.lower() == ".exr"
-    pixels = image.pixels if linear else to_srgb8(image.pixels * exposure(image.pixels, image.mask))
-    write_image(options.output, pixels)
-    if not options.json:
-        print(f"{label(brdf)} → {options.output} ({seconds:.1f} s)")
-    return {
-        "image": str(options.output),
-        "seconds": seconds,
-        "spp": options.spp,
-        "variant": mitsuba().variant(),
-        "material": label(brdf),
-        "sampler": options.sampler,
-    }
-
-
 def plot(options: Namespace) -> dict[str, Any]:
     for source in options.materials:
         check_output(options.output, tuple(plots.FORMATS), source)
@@ -305,7 +274,7 @@ def _by_name(sources: list[str]) -> dict[str, Brdf]:
     return result
 
 
-def _alike(reference: Brdf, candidate: Brdf, asked: Any) -> tuple[Brdf, Brdf]:
+def alike(reference: Brdf, candidate: Brdf, asked: Any) -> tuple[Brdf, Brdf]:
     """Both, looked up as asked; else a table as the SOM-MAN material on its lattice, so that like meets like."""
 
     def adapted(brdf: Brdf, other: Brdf) -> Brdf:
@@ -318,11 +287,11 @@ def _alike(reference: Brdf, candidate: Brdf, asked: Any) -> tuple[Brdf, Brdf]:
     return adapted(reference, candidate), adapted(candidate, reference)
 
 
-def _sampled(reference: Brdf, candidate: Brdf) -> tuple[BrdfTable, BrdfTable]:
-    """Both at the cell centres of one lattice: the reference's, the candidate's or MERL's."""
+def table_distance(reference: Brdf, candidate: Brdf) -> dict[str, float]:
+    """How far two are apart at the cell centres of one lattice: the reference's, the candidate's or MERL's."""
     lattices = [brdf.grid for brdf in (reference, candidate) if isinstance(brdf, OnLattice) and brdf.grid]
     first, second = (BrdfTable.sample(brdf, *lattices[:1]) for brdf in (reference, candidate))
-    return first, second
+    return asdict(table_metrics(first.values, second.values, first.lattice))
 
 
 def check_output(path: Path, extensions: tuple[str, ...], source: str = "") -> None:
@@ -335,11 +304,15 @@ def check_output(path: Path, extensions: tuple[str, ...], source: str = "") -> N
     check_writable(path)
 
 
-def _environment(options: Namespace) -> Any:
-    """The environment asked for; checks the other options of rendering, too."""
+def check_rendering(options: Namespace) -> None:
+    """Checks the options that all renderings have."""
     for name, low, high in (("spp", 1, MOST_SPP), ("size", SMALLEST_SIZE, LARGEST_SIZE), ("seed", 0, 2**64 - 1)):
         if not low <= getattr(options, name) <= high:
             raise OptionError(f"{name}: expected {low} to {high}, found {getattr(options, name)}")
     if options.envmap and not options.envmap.is_file():
         raise FormatError(f"{options.envmap}: expected an environment image, found no file")
+
+
+def environment_of(options: Namespace) -> Any:
+    """The environment asked for, or the built-in one."""
     return load_environment(options.envmap) if options.envmap else default_environment()

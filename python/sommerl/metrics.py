@@ -154,8 +154,15 @@ def delta_e_itp(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: Mask) -> float
 
 def flip(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: Mask) -> float:
     """Mean ꟻLIP over the mask, at the tool's default viewing distance (67 pixels per degree)."""
+    return float(_flip(a, b, False)[..., 0][mask].mean())
+
+
+def flip_map(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """ꟻLIP of each pixel, in its authors' colours (magma: black for none, white for 1), as 8-bit pixels."""
+    return np.round(255 * _flip(a, b, True)).astype(np.uint8)
+
+
+def _flip(a: NDArray[np.uint8], b: NDArray[np.uint8], coloured: bool) -> NDArray[np.float32]:
     kept = optional("flip_evaluator", "flip-evaluator", "image metrics", "render")
-    difference, _, _ = kept.evaluate(
-        (a / 255.0).astype(np.float32), (b / 255.0).astype(np.float32), "LDR", applyMagma=False, computeMeanError=False
-    )
-    return float(np.asarray(difference)[..., 0][mask].mean())
+    images = ((image / 255.0).astype(np.float32) for image in (a, b))
+    return np.asarray(kept.evaluate(*images, "LDR", applyMagma=coloured, computeMeanError=False)[0])

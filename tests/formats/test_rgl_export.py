@@ -10,7 +10,8 @@ from sommerl.materials import builtin
 from sommerl.metrics import image_metrics
 from sommerl.render.environment import default_environment
 from sommerl.render.llvm import mitsuba
-from sommerl.render.scenes import render, sphere
+from sommerl.render.passes import Scene, render
+from sommerl.render.scenes import sphere
 from sommerl.sampling.blinn_phong import BlinnPhongSampler
 
 A, B = (w[w[:, 2] > 0.1][:2000] for w in (random_directions(3000, s) for s in (1, 2)))
@@ -31,10 +32,11 @@ def test_a_lambertian_comes_back(tmp_path):
 
 def on_a_sphere(bsdf, sampler_of):
     """The scene `sphere` with a BSDF of Mitsuba's own, which draws its own directions."""
-    scene = sphere(sampler_of, default_environment(), size=64)
+    scene = sphere(sampler_of, default_environment(), size=64).mitsuba
     mi = mitsuba()
     children = {"integrator": scene.integrator(), "sensor": scene.sensors()[0], "emitter": scene.emitters()[0]}
-    return mi.load_dict({"type": "scene", **children, "object": {"type": "sphere", "bsdf": bsdf}})
+    made = mi.load_dict({"type": "scene", **children, "object": {"type": "sphere", "bsdf": bsdf}})
+    return Scene(made, ("object",))
 
 
 def test_mitsuba_renders_the_file_as_the_material(tmp_path):

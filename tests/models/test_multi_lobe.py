@@ -17,7 +17,8 @@ from sommerl.models.phong import PHONG
 from sommerl.models.ward import WARD
 from sommerl.render.bsdf import make_bsdf
 from sommerl.render.llvm import drjit, mitsuba
-from sommerl.render.scenes import render, sphere
+from sommerl.render.passes import render
+from sommerl.render.scenes import sphere
 
 WI, WO = pairs()
 BASE = Lobe(LAMBERTIAN, (0.4, 0.2, 0.1), {})

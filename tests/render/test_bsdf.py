@@ -256,7 +256,8 @@ with warnings.catch_warnings(record=True) as caught:
     mi = llvm.mitsuba()
 assert any("falls back to scalar mode" in str(w.message) for w in caught)
 assert mi.variant() == "scalar_rgb"
-from sommerl.render.scenes import render, sphere
+from sommerl.render.passes import render
+from sommerl.render.scenes import sphere
 table = BrdfTable(np.full((4, 4, 4, 3), 0.5 / np.pi), Lattice(4, 4, 4))
 image = render(sphere(table, np.ones((8, 16, 3), np.float32), size=8), spp=16)
 print(image.pixels[3:5, 3:5].mean(), image.mask.sum())

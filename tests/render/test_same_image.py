@@ -9,7 +9,8 @@ from histograms import check_same_image
 
 from sommerl import builtin
 from sommerl.render.environment import default_environment
-from sommerl.render.scenes import render, sphere
+from sommerl.render.passes import render
+from sommerl.render.scenes import sphere
 from sommerl.sampling.half_vector import HalfVectorSampler
 from sommerl.sampling.named import OURS, SAMPLERS
 

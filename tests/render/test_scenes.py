@@ -7,9 +7,20 @@ from sommerl.errors import FormatError
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
 from sommerl.render.compare import compare_on_sphere
 from sommerl.render.environment import LIGHTS, default_environment, load_environment
-from sommerl.render.images import difference, encode, side_by_side, write_image, write_page
+from sommerl.render.images import (
+    captioned,
+    difference,
+    encode,
+    shortened,
+    side_by_side,
+    signed_difference,
+    tiled,
+    write_image,
+    write_page,
+)
 from sommerl.render.llvm import mitsuba
-from sommerl.render.scenes import FILL, render, sphere
+from sommerl.render.passes import render
+from sommerl.render.scenes import FILL, sphere
 
 WHITE = np.ones((16, 32, 3), np.float32)
 mi = mitsuba()
@@ -54,10 +65,10 @@ def test_any_seed_serves_and_none_repeats_another(small_table):
 def test_passes_add_up_and_are_reported(small_table, monkeypatch):
     scene = sphere(small_table, default_environment(32), size=16)
     whole = render(scene, spp=64)
-    monkeypatch.setattr("sommerl.render.scenes.SAMPLES_A_PASS", 16 * 16 * 24)
+    monkeypatch.setattr("sommerl.render.passes.SAMPLES_A_PASS", 16 * 16 * 24)
     steps = []
     parts = render(scene, spp=64, progress=lambda *step: steps.append(step))
-    assert steps == [(1, 3), (2, 3), (3, 3)]
+    assert steps == [(1, 4), (2, 4), (3, 4), (4, 4)]  # of 16 samples, a power of two
     assert not np.array_equal(parts.pixels, whole.pixels)
     assert parts.pixels[parts.mask].mean() == pytest.approx(whole.pixels[whole.mask].mean(), rel=0.05)
 
@@ -125,6 +136,16 @@ def test_environment_from_a_file(tmp_path):
         load_environment(tmp_path / "text.exr")
 
 
+def test_images_that_are_no_lights_are_refused(tmp_path):
+    grey = np.full((8, 16, 3), 128, np.uint8)
+    for name, pixels in (("a.png", grey), ("a.jpg", grey), ("deep.png", grey.astype(np.uint16))):
+        mi.Bitmap(pixels).write(str(tmp_path / name))
+        with pytest.raises(FormatError, match=f"{name}: expected radiance in numbers that go beyond white"):
+            load_environment(tmp_path / name)
+    mi.Bitmap(default_environment(8)).write(str(tmp_path / "a.hdr"))
+    assert load_environment(tmp_path / "a.hdr").shape == (8, 16, 3)
+
+
 def test_images_are_written_and_read_back(tmp_path):
     rng = np.random.default_rng(0)
     bytes8 = rng.integers(0, 256, (5, 7, 3), np.uint8)
@@ -140,6 +161,37 @@ def test_difference_is_absolute_and_eightfold():
     a, b = np.array([[[10, 10, 200]]], np.uint8), np.array([[[13, 8, 0]]], np.uint8)
     assert difference(a, b).tolist() == difference(b, a).tolist() == [[[24, 16, 255]]]
     assert side_by_side([a, b]).shape == (1, 2, 3)
+
+
+def test_signed_difference_is_grey_where_images_agree():
+    a = np.full((1, 4, 3), 100, np.uint8)
+    b = a + np.array([0, 4, 0, 0], np.uint8)[None, :, None] - np.array([0, 0, 4, 100], np.uint8)[None, :, None]
+    same, brighter, darker, far = signed_difference(a, b)[0].astype(int)
+    assert same.tolist() == [128, 128, 128]
+    assert brighter[0] > 128 > brighter[2]
+    assert darker[0] < 128 < darker[2]
+    assert far.tolist() == [130, 235, 255]
+
+
+def test_sheets_keep_every_pixel_and_stay_in_order():
+    pictures = [np.full((40, 50, 3), value, np.uint8) for value in (10, 20, 30)]
+    sheet = tiled(pictures, 2)
+    assert sheet.shape == (80, 100, 3)
+    assert [sheet[y, x, 0] for y, x in ((0, 0), (0, 50), (40, 0), (40, 50))] == [10, 20, 30, 0]
+    labelled = captioned([("one", pictures[0]), ("$two_", pictures[1]), ("ΔE", pictures[2])], 2, "a note")
+    band = (labelled.shape[0] - 80) // 3
+    assert (labelled[:40, :50] == 10).all()
+    assert (labelled[40 + band : 80 + band, :50] == 30).all()
+    assert (labelled[40 + band : 80 + 2 * band, 50:] == 255).all()
+    for rows, columns in ((slice(40, 40 + band), slice(50)), (slice(-band, None), slice(None))):
+        letters = labelled[rows, columns]
+        assert letters.min() < 100 < 200 < np.median(letters)
+
+
+def test_long_captions_lose_their_middle():
+    assert shortened("short", 10) == "short"
+    assert shortened("blue-metallic-paint", 9) == "blue…aint"
+    assert [len(shortened("x" * 50, most)) for most in (9, 10, 11)] == [9, 10, 11]
 
 
 def test_page_holds_its_pictures_and_escapes_its_text(tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,10 @@ from numpy.typing import NDArray
 from ..brdf import Brdf
 from ..metrics import ImageMetrics, exposure, image_metrics, psnr, to_srgb8
 from ..sampling.half_vector import HalfVectorSampler
+from .checkpoint import Image
 from .images import difference
-from .scenes import DEFAULT_SIZE, DEFAULT_SPP, Image, Progress, render, sphere
+from .passes import DEFAULT_SIZE, DEFAULT_SPP, Progress, render, render_all
+from .scenes import sphere
 
 
 @dataclass(frozen=True)
@@ -23,10 +26,19 @@ class Comparison:
     candidate: Image
     metrics: ImageMetrics
 
+    @classmethod
+    def of(cls, reference: Image, candidate: Image) -> Comparison:
+        """Measures over the object's pixels, which are the same in both."""
+        return cls(reference, candidate, image_metrics(reference.pixels, candidate.pixels, reference.mask))
+
+    def exposed(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Reference and candidate in 8 bits at the reference's exposure."""
+        scale = exposure(self.reference.pixels, self.reference.mask)
+        return to_srgb8(self.reference.pixels * scale), to_srgb8(self.candidate.pixels * scale)
+
     def pictures(self) -> list[NDArray[np.uint8]]:
         """Reference, candidate and their difference (×8), in 8 bits at the reference's exposure."""
-        scale = exposure(self.reference.pixels, self.reference.mask)
-        a, b = (to_srgb8(image.pixels * scale) for image in (self.reference, self.candidate))
+        a, b = self.exposed()
         return [a, b, difference(a, b)]
 
 
@@ -46,17 +58,9 @@ def compare_on_sphere(
     representation and not the noise.
     """
     sampler = HalfVectorSampler.fitted(reference)
-    images: list[Image] = []
-    for brdf in (reference, *candidates):
-
-        def advance(done: int, passes: int) -> None:
-            if progress:
-                progress(len(images) * passes + done, (1 + len(candidates)) * passes)
-
-        scene = sphere(brdf, environment, sampler=sampler, size=size)
-        images.append(render(scene, spp=spp, seed=seed, progress=advance))
-    first, *others = images
-    return [Comparison(first, image, image_metrics(first.pixels, image.pixels, first.mask)) for image in others]
+    scenes = [partial(sphere, brdf, environment, sampler=sampler, size=size) for brdf in (reference, *candidates)]
+    first, *others = render_all(scenes, spp=spp, seed=seed, progress=progress)
+    return [Comparison.of(first, image) for image in others]
 
 
 def judge_on_sphere(reference: Brdf, environment: NDArray[np.float32]) -> Callable[[Brdf], float]:

@@ -45,14 +45,20 @@ def default_environment(height: int = 512) -> NDArray[np.float32]:
 def load_environment(path: Path) -> NDArray[np.float32]:
     """A latitude-longitude image (OpenEXR, Radiance HDR …), linear RGB, of shape (height, width, 3).
 
-    Raises FormatError if it cannot be read or holds values that no light has.
+    Raises FormatError if it cannot be read, is an image of low dynamic range (PNG, JPEG), or holds values that no light
+    has.
     """
     mi = mitsuba()
     try:
-        bitmap = mi.Bitmap(str(path)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False)
+        bitmap = mi.Bitmap(str(path))
+        kind = bitmap.component_format()
+        linear = bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False)
     except RuntimeError as error:
         raise FormatError(f"{path}: expected an environment image, found something unreadable") from error
-    radiance = np.array(bitmap)
+    if kind not in (mi.Struct.Type.Float16, mi.Struct.Type.Float32, mi.Struct.Type.Float64):
+        # It would light the scene all the same, with lamps no brighter than paper.
+        raise FormatError(f"{path}: expected radiance in numbers that go beyond white (.exr, .hdr), found an LDR image")
+    radiance = np.array(linear)
     if not (np.isfinite(radiance).all() and (radiance >= 0).all() and radiance.any()):
         raise FormatError(f"{path}: expected finite, non-negative radiance, found other values or only black")
     return radiance

@@ -12,9 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..files import atomic_write
+from ..optional import optional
 from .llvm import mitsuba
 
 DIFFERENCE_GAIN = 8
+GREY = (128, 128, 128)
+BRIGHTER, DARKER = (205, 45, 35, 255, 225, 120), (40, 75, 200, 130, 235, 255)  # halfway, and at the end
 
 
 def encode(pixels: NDArray[Any]) -> bytes:
@@ -38,6 +41,69 @@ def difference(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """The absolute difference of two 8-bit images, eight times enlarged: black where they agree."""
     magnified = DIFFERENCE_GAIN * np.abs(a.astype(np.int32) - b.astype(np.int32))
     return np.minimum(magnified, 255).astype(np.uint8)
+
+
+def signed_difference(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """How much brighter b is than a, in the mean of the channels, eight times enlarged: grey where they agree, through
+    red to yellow where b is brighter, through blue to cyan where it is darker."""
+    change = (b.astype(np.float64) - a).mean(axis=-1)[..., None]
+    size = np.minimum(DIFFERENCE_GAIN * np.abs(change) / 255, 1)
+    steps = np.where(change > 0, BRIGHTER, DARKER)
+    half = size < 0.5
+    low, high = np.where(half, GREY, steps[..., :3]), np.where(half, steps[..., :3], steps[..., 3:])
+    colour: NDArray[np.float64] = low + (2 * size - np.where(half, 0, 1)) * (high - low)
+    return np.round(colour).astype(np.uint8)
+
+
+def tiled(pictures: Sequence[NDArray[Any]], columns: int) -> NDArray[Any]:
+    """Pictures of one size in rows, black where the last row ends early."""
+    rows = -(-len(pictures) // columns)
+    height, width, *rest = pictures[0].shape
+    sheet = np.zeros((rows, height, columns, width, *rest), pictures[0].dtype)
+    for number, picture in enumerate(pictures):
+        sheet[number // columns, :, number % columns] = picture
+    return sheet.reshape(rows * height, columns * width, *rest)
+
+
+def captioned(pictures: Sequence[tuple[str, NDArray[np.uint8]]], columns: int, note: str = "") -> NDArray[np.uint8]:
+    """Pictures of one size in rows, pixel for pixel, on white, each with a caption below, and a note below all.
+
+    Raises MissingDependencyError without matplotlib.
+    """
+    figures = optional("matplotlib.figure", "matplotlib", "labels", "render")
+    agg = optional("matplotlib.backends.backend_agg", "matplotlib", "labels", "render")
+    height, width = pictures[0][1].shape[:2]
+    text = max(9, width // 22)  # the height of letters, in pixels
+    band = 2 * text
+    step = height + band
+    rows = -(-len(pictures) // columns)
+    whole = columns * width, rows * step + (band if note else 0)
+    sheet = np.full((whole[1], whole[0], 3), 255, np.uint8)
+    figure = figures.Figure(figsize=((whole[0] + 0.5) / 100, (whole[1] + 0.5) / 100), dpi=100)
+    canvas = agg.FigureCanvasAgg(figure)
+
+    def write(x: float, y: float, words: str) -> None:
+        # No mathematics: a dollar or an underscore in a name is one.
+        x, y = x / whole[0], 1 - y / whole[1]
+        figure.text(x, y, words, fontsize=0.72 * text, ha="center", va="center", parse_math=False)
+
+    for number, (caption, picture) in enumerate(pictures):
+        x, y = number % columns * width, number // columns * step
+        sheet[y : y + height, x : x + width] = picture
+        write(x + width / 2, y + height + band / 2, shortened(caption, int(1.9 * width / text)))
+    if note:
+        write(whole[0] / 2, whole[1] - band / 2, note)
+    canvas.draw()
+    drawn = np.asarray(canvas.buffer_rgba())[: whole[1], : whole[0], :3]
+    return np.minimum(drawn, sheet)  # letters are darker than the bands that they stand on
+
+
+def shortened(text: str, most: int) -> str:
+    """A text of at most so many letters, its middle left out."""
+    if len(text) <= most:
+        return text
+    keep = max(most - 1, 2)
+    return f"{text[: -(-keep // 2)]}…{text[len(text) - keep // 2 :]}"
 
 
 def side_by_side(pictures: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:

@@ -3,98 +3,226 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..brdf import Brdf
+from ..errors import OptionError
 from ..sampling.sampler import Sampler
 from .bsdf import make_bsdf
-from .llvm import drjit, mitsuba
+from .environment import default_environment
+from .llvm import mitsuba
+from .meshes import Mesh, knot, lathe
+from .passes import DEFAULT_SIZE, Scene
 
-LARGEST_SIZE = 2048  # a pass of one sample a pixel then still fits into 1 GB
-SAMPLES_A_PASS = 2**22  # or one a pixel: bounds memory, and Mitsuba crashes beyond 2^32
 FILL = 0.9  # of the frame's height, by the sphere
 DISTANCE = 5.0  # of the camera, in radii of the sphere
-DEFAULT_SIZE, DEFAULT_SPP = 256, 256
+BOUNCES = 8  # of light, where there is more than one object
 
-Progress = Callable[[int, int], None]  #: passes done, passes in all
-
-
-@dataclass(frozen=True)
-class Image:
-    """A rendered frame: linear RGB (height, width, 3), and which pixels' centres show an object (height, width)."""
-
-    pixels: NDArray[np.float32]
-    mask: NDArray[np.bool_]
+Point = tuple[float, float, float]
 
 
 def sphere(
     brdf: Brdf, environment: NDArray[np.float32], *, sampler: Sampler | None = None, size: int = DEFAULT_SIZE
-) -> Any:
-    """A Mitsuba scene: one sphere of the material in an environment that is visible behind it.
+) -> Scene:
+    """One sphere of the material in an environment that is visible behind it.
 
     environment: radiance (height, width, 3), see `environment.py`. sampler: see `make_bsdf`. size: of the square
     frame, in pixels.
     """
+    fov = 2 * math.degrees(math.atan(math.tan(math.asin(1 / DISTANCE)) / FILL))
+    things = {
+        "environment": _envmap(environment),
+        "object": {"type": "sphere", "bsdf": make_bsdf(brdf, sampler)},
+    }
+    # A sphere alone sees the environment and nothing else.
+    return _scene(things, ("object",), (0, 0, DISTANCE), (0, 0, 0), fov, size=size, bounces=1)
+
+
+def statue(
+    brdf: Brdf,
+    environment: NDArray[np.float32],
+    *,
+    mesh: Mesh | None = None,
+    sampler: Sampler | None = None,
+    size: int = DEFAULT_SIZE,
+) -> Scene:
+    """A mesh of the material, scaled to unit height, on a grey plane in an environment: global illumination.
+
+    mesh: see `meshes.load_mesh`; a carved finial if None. The others: see `sphere`.
+    """
+    figure = (mesh or finial()).standing()
+    things = {
+        "environment": _envmap(environment),
+        "plane": _plane(0.06),
+        "statue": figure.shape(make_bsdf(brdf, sampler)),
+    }
+    return _scene(things, ("statue",), (0.0, 0.95, 3.4), (0.0, 0.49, 0.0), 19.5, size=size, bounces=BOUNCES)
+
+
+def still_life(brdfs: Sequence[Brdf], *, samplers: Sequence[Sampler] | None = None, size: int = DEFAULT_SIZE) -> Scene:
+    """Three materials on a table under area lights, whose objects reflect each other: a bowl with two balls, a knot, a
+    vase, and a third ball.
+
+    In the spirit of the paper's Fig. 7. brdfs: of the bowl and the ball beside it; of the knot and a ball in the bowl;
+    of the vase and the other ball in the bowl. samplers: one for each, see `make_bsdf`.
+    """
+    one, two, three = (make_bsdf(brdf, samplers[k] if samplers else None) for k, brdf in enumerate(brdfs))
+    objects: dict[str, Any] = {
+        "bowl": bowl().moved(-0.42, 0, 0.42).shape(one),
+        "ball": _ball(0.17, (0.4, 0.17, 0.72), one),
+        "knot": knot("knot").standing(1.0).turned(-20).moved(0.62, 0, -0.08).shape(two),
+        "ball in the bowl": _ball(0.17, (-0.27, 0.242, 0.37), two),
+        "vase": vase().moved(-0.38, 0, -0.72).shape(three),
+        "other ball in the bowl": _ball(0.15, (-0.58, 0.222, 0.45), three),
+    }
+    things = objects | {
+        "table": _plane(0.08),
+        "fill": {"type": "constant", "radiance": {"type": "rgb", "value": 0.1}},
+        "key": _light((-2.4, 2.8, 1.6), (0, 0.3, 0), (0.8, 0.8), (9.0, 8.6, 8.0)),
+        "rim": _light((2.9, 1.7, -1.0), (0, 0.5, 0), (0.4, 1.3), (6.0, 6.6, 7.5)),
+        "front": _light((1.6, 2.4, 3.6), (0, 0.4, 0), (0.5, 0.5), (5.0, 5.0, 5.0)),
+    }
+    return _scene(things, tuple(objects), (0.0, 1.75, 4.6), (0.04, 0.4, 0.0), 25.5, size=size, bounces=BOUNCES)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What a scene takes.
+
+    materials: the built-in ones that are shown if no others are given: their number is that of the scene's.
+    """
+
+    materials: tuple[str, ...]
+    environment: bool = True
+    mesh: bool = False
+
+
+STAGES: Mapping[str, Stage] = {
+    "sphere": Stage(("blue-metallic-paint",)),
+    "statue": Stage(("blue-metallic-paint",), mesh=True),
+    "still-life": Stage(("nickel", "yellow-matte-plastic", "blue-metallic-paint"), environment=False),
+}
+
+
+def stage(
+    name: str,
+    brdfs: Sequence[Brdf],
+    *,
+    samplers: Sequence[Sampler] | None = None,
+    environment: NDArray[np.float32] | None = None,
+    mesh: Mesh | None = None,
+    size: int = DEFAULT_SIZE,
+) -> Scene:
+    """A scene by its name, with as many materials as it takes, see `STAGES`.
+
+    environment, mesh: the scene's own if None. Raises OptionError for what the scene does not take.
+    """
+    taken = STAGES[name]
+    if len(brdfs) != len(taken.materials):
+        raise OptionError(f"{name}: expected {len(taken.materials)} materials, found {len(brdfs)}")
+    for what, given, allowed in (("environment", environment, taken.environment), ("mesh", mesh, taken.mesh)):
+        if given is not None and not allowed:
+            raise OptionError(f"{name}: expected no {what}, since it has its own, found one")
+    if name == "still-life":
+        return still_life(brdfs, samplers=samplers, size=size)
+    light = default_environment() if environment is None else environment
+    sampler = samplers[0] if samplers else None
+    if name == "statue":
+        return statue(brdfs[0], light, mesh=mesh, sampler=sampler, size=size)
+    return sphere(brdfs[0], light, sampler=sampler, size=size)
+
+
+@cache
+def finial() -> Mesh:
+    """A pine cone on a turned foot, with a ball on top: carved, smooth, hollow and sharp in turn."""
+    foot = [(0, 0), (0.27, 0), (0.27, 0), (0.27, 0.06), (0.27, 0.06), (0.235, 0.075), (0.25, 0.11), (0.2, 0.125)]
+    stem = [(0.115, 0.15), (0.085, 0.21), (0.085, 0.21), (0.15, 0.235), (0.15, 0.26), (0.1, 0.275), (0.1, 0.29)]
+    body = [(0.27, 0.31), (0.3, 0.5), (0.2, 0.71), (0.08, 0.79), (0.05, 0.81), (0.05, 0.81)]
+    ball = [(0.1 * math.sin(a), 0.9 - 0.1 * math.cos(a)) for a in np.radians(range(30, 181, 10))]
+
+    def scales(y: NDArray[np.float64], phi: NDArray[np.float64]) -> NDArray[np.float64]:
+        v = np.clip((y - 0.3) / 0.47, 0, 1)
+        window = np.clip(8 * v, 0, 1) * np.clip(5 * (1 - v), 0, 1)
+        one, other = (np.cos(n * phi / 2 + sign * 15 * v) ** 2 + 0.01 for n, sign in ((8, 1), (13, -1)))
+        return 0.035 * window * (one * other) ** 0.3
+
+    return lathe("statue", [*foot, *stem, *body, *ball], rows=240, columns=200, relief=scales)
+
+
+def bowl() -> Mesh:
+    """A bowl with a rim, 1 wide."""
+    outside = [(0, 0), (0.2, 0), (0.2, 0), (0.2, 0.03), (0.42, 0.1), (0.5, 0.33), (0.5, 0.33)]
+    inside = [(0.47, 0.33), (0.47, 0.33), (0.4, 0.12), (0.2, 0.06), (0, 0.06)]
+    return lathe("bowl", outside + inside, rows=200, columns=160)
+
+
+def vase() -> Mesh:
+    """A vase with a neck, fluted."""
+    outside = [(0, 0), (0.22, 0), (0.22, 0), (0.22, 0.03), (0.4, 0.25), (0.42, 0.6), (0.16, 0.85), (0.13, 1.0)]
+    inside = [(0.24, 1.12), (0.24, 1.12), (0.22, 1.12), (0.11, 1.0), (0.11, 0.8), (0, 0.8)]
+    return lathe("vase", outside + inside, rows=260, columns=160)
+
+
+def _scene(
+    things: Mapping[str, Any],
+    objects: tuple[str, ...],
+    origin: Point,
+    target: Point,
+    fov: float,
+    *,
+    size: int,
+    bounces: int,
+) -> Scene:
+    """things: everything but camera and integrator. fov: of the square frame [degrees]."""
     mi = mitsuba()
-    half_angle = math.asin(1 / DISTANCE)
-    return mi.load_dict(
-        {
-            "type": "scene",
-            "integrator": {"type": "path", "max_depth": 2},  # a sphere alone sees the environment and nothing else
-            "sensor": {
-                "type": "perspective",
-                "fov": 2 * math.degrees(math.atan(math.tan(half_angle) / FILL)),
-                "to_world": mi.ScalarTransform4f().look_at(origin=[0, 0, DISTANCE], target=[0, 0, 0], up=[0, 1, 0]),
-                "film": {
-                    "type": "hdrfilm",
-                    "width": size,
-                    "height": size,
-                    "rfilter": {"type": "box"},  # the one filter whose result is the same, bit for bit, every time
-                    "pixel_format": "rgb",
-                },
-                "sampler": {"type": "independent"},
-            },
-            "environment": {"type": "envmap", "bitmap": mi.Bitmap(np.ascontiguousarray(environment))},
-            "object": {"type": "sphere", "bsdf": make_bsdf(brdf, sampler)},
-        }
-    )
+    film = {
+        "type": "hdrfilm",
+        "width": size,
+        "height": size,
+        "rfilter": {"type": "box"},  # the one filter whose result is the same, bit for bit, every time
+        "pixel_format": "rgb",
+    }
+    camera = {
+        "type": "perspective",
+        "fov": fov,
+        "to_world": mi.ScalarTransform4f().look_at(origin=list(origin), target=list(target), up=[0, 1, 0]),
+        "film": film,
+        "sampler": {"type": "independent"},
+    }
+    # Russian roulette would end paths by how dark the material is: the same seed would give other directions to each.
+    integrator = {"type": "path", "max_depth": bounces + 1, "rr_depth": bounces + 2}
+    return Scene(mi.load_dict({"type": "scene", "integrator": integrator, "sensor": camera, **things}), objects)
 
 
-def render(scene: Any, *, spp: int = DEFAULT_SPP, seed: int = 0, progress: Progress | None = None) -> Image:
-    """Renders a scene in passes of bounded size. The same scene, spp and seed give the same pixels on one machine."""
-    mi = mitsuba()
-    width, height = (int(n) for n in scene.sensors()[0].film().size())
-    chunk = max(1, min(spp, SAMPLES_A_PASS // (width * height)))
-    passes = -(-spp // chunk)
-    total = np.zeros((height, width, 3))
-    for number in range(passes):
-        samples = min(chunk, spp - number * chunk)
-        pixels = np.array(mi.render(scene, spp=samples, seed=_seed(seed, number)))
-        total += samples * pixels.astype(np.float64)
-        if progress:
-            progress(number + 1, passes)
-    return Image((total / spp).astype(np.float32), _mask(scene, width, height))
+def _envmap(environment: NDArray[np.float32]) -> dict[str, Any]:
+    return {"type": "envmap", "bitmap": mitsuba().Bitmap(np.ascontiguousarray(environment))}
 
 
-def _seed(seed: int, number: int) -> int:
-    """A seed of 32 bits for one pass: different for every pass of every seed, as far as 32 bits go."""
-    return int(np.random.SeedSequence([seed, number]).generate_state(1)[0])
+def _plane(albedo: float) -> dict[str, Any]:
+    """The plane y = 0, grey, as far as one can see."""
+    transform = mitsuba().ScalarTransform4f
+    return {
+        "type": "disk",
+        "to_world": transform().rotate([1, 0, 0], -90).scale(60),
+        "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": albedo}},
+    }
 
 
-def _mask(scene: Any, width: int, height: int) -> NDArray[np.bool_]:
-    """Which pixels show an object at their centre."""
-    mi, dr = mitsuba(), drjit()
-    sensor = scene.sensors()[0]
-    if mi.variant().startswith("scalar"):
-        centres = [((x + 0.5) / width, (y + 0.5) / height) for y in range(height) for x in range(width)]
-        rays = (sensor.sample_ray(0, 0.5, centre, (0.5, 0.5))[0] for centre in centres)
-        return np.array([scene.ray_test(ray) for ray in rays]).reshape(height, width)
-    i = dr.arange(mi.UInt32, width * height)
-    centres = mi.Point2f((mi.Float(i % width) + 0.5) / width, (mi.Float(i // width) + 0.5) / height)
-    rays, _ = sensor.sample_ray(0.0, 0.5, centres, mi.Point2f(0.5))
-    return np.array(scene.ray_test(rays)).reshape(height, width)
+def _ball(radius: float, at: Point, bsdf: Any) -> dict[str, Any]:
+    return {"type": "sphere", "radius": radius, "center": list(at), "bsdf": bsdf}
+
+
+def _light(at: Point, towards: Point, half: tuple[float, float], radiance: Point) -> dict[str, Any]:
+    """A rectangle that shines on one side; half: of its width and height."""
+    transform = mitsuba().ScalarTransform4f
+    return {
+        "type": "rectangle",
+        "to_world": transform().look_at(origin=list(at), target=list(towards), up=[0, 1, 0]).scale([*half, 1]),
+        "emitter": {"type": "area", "radiance": {"type": "rgb", "value": list(radiance)}},
+    }

@@ -1,0 +1,137 @@
+"""Rendering in passes: bounded memory, progress, and long renders that go on where they were stopped."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import __version__
+from .checkpoint import Checkpoint, Image, State
+from .llvm import drjit, mitsuba
+
+LARGEST_SIZE = 2048  # a pass of one sample a pixel then still fits into 1 GB
+SAMPLES_A_PASS = 2**22  # or one a pixel: bounds memory, and Mitsuba crashes beyond 2^32
+MOST_A_PIXEL = 2**12  # in a pass; from 2^16 on, threads share pixels, and sums depend on their order
+DEFAULT_SIZE, DEFAULT_SPP = 256, 256
+
+Progress = Callable[[int, int], None]  #: passes done, passes in all
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A Mitsuba scene, and the names of those of its shapes that carry the materials: its objects."""
+
+    mitsuba: Any
+    objects: tuple[str, ...]
+
+
+def render(scene: Scene, *, spp: int = DEFAULT_SPP, seed: int = 0, progress: Progress | None = None) -> Image:
+    """Renders a scene in passes of bounded size. The same scene, spp and seed give the same pixels on one machine."""
+    return render_all([lambda: scene], spp=spp, seed=seed, progress=progress)[0]
+
+
+def render_all(
+    scenes: Sequence[Callable[[], Scene]],
+    *,
+    spp: int = DEFAULT_SPP,
+    seed: int = 0,
+    progress: Progress | None = None,
+    checkpoint: Checkpoint | None = None,
+) -> list[Image]:
+    """Renders several scenes as `render` does, each with the same seed, hence alike scenes with the same directions.
+
+    scenes: functions that make them; each is called when its turn comes, so that not all have to fit into memory.
+    checkpoint: is read first, so that a render which was stopped goes on, with the same pixels as if it had not been;
+    is written every few seconds and when Python is interrupted; and is left for the caller to remove.
+    """
+    mi = mitsuba()
+    identity = {"spp": str(spp), "seed": str(seed), "variant": mi.variant(), "size of passes": str(SAMPLES_A_PASS)}
+    identity |= {"version of Sommerl": __version__, "version of Mitsuba": mi.__version__}
+    state = checkpoint.load(identity) if checkpoint else State()
+    try:
+        for make in scenes[len(state.images) :]:
+            with _undisturbed():
+                scene = make()
+            width, height = (int(n) for n in scene.mitsuba.sensors()[0].film().size())
+            passes = _passes(spp, width * height)
+            before, of_all = len(state.images) * len(passes), len(scenes) * len(passes)
+            if progress and state.passes:
+                progress(before + state.passes, of_all)
+            for number in range(state.passes, len(passes)):
+                with _undisturbed():
+                    pixels = np.array(mi.render(scene.mitsuba, spp=passes[number], seed=_seed(seed, number)))
+                    total = passes[number] * pixels.astype(np.float64)
+                    state = State(state.images, total if state.total is None else state.total + total, number + 1)
+                if checkpoint:
+                    checkpoint.save(state)
+                if progress:
+                    progress(before + number + 1, of_all)
+            assert state.total is not None
+            with _undisturbed():
+                image = Image((state.total / spp).astype(np.float32), _mask(scene, width, height))
+                state = State((*state.images, image))
+    except KeyboardInterrupt:
+        if checkpoint and (state.images or state.passes):
+            checkpoint.save(state, now=True)
+        raise
+    return list(state.images)
+
+
+@contextmanager
+def _undisturbed() -> Generator[None]:
+    """Holds an interruption back until the block has ended: Mitsuba would make another error of it, in mid-air."""
+    interrupt = signal.default_int_handler
+    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is not interrupt:
+        yield
+        return
+    came: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, interrupt)
+    if came:
+        raise KeyboardInterrupt
+
+
+def _passes(spp: int, pixels: int) -> list[int]:
+    """How many samples a pixel each pass takes: a power of two, so that no two threads share a pixel.
+
+    Dr.Jit gives each thread a row of samples whose length is a power of two. Where a row ends among a pixel's samples,
+    two threads add to that pixel, and its sum is rounded by the order in which they come.
+    """
+    most = max(1, min(MOST_A_PIXEL, SAMPLES_A_PASS // pixels))
+    most = 1 << most.bit_length() - 1
+    return [most] * (spp // most) + [1 << bit for bit in reversed(range(most.bit_length())) if spp % most & 1 << bit]
+
+
+def _seed(seed: int, number: int) -> int:
+    """A seed of 32 bits for one pass: different for every pass of every seed, as far as 32 bits go."""
+    return int(np.random.SeedSequence([seed, number]).generate_state(1)[0])
+
+
+def _mask(scene: Scene, width: int, height: int) -> NDArray[np.bool_]:
+    """Which pixels show an object at their centre."""
+    mi, dr = mitsuba(), drjit()
+    sensor = scene.mitsuba.sensors()[0]
+    objects = [shape for shape in scene.mitsuba.shapes() if shape.id() in scene.objects]
+    if mi.variant().startswith("scalar"):
+        centres = [((x + 0.5) / width, (y + 0.5) / height) for y in range(height) for x in range(width)]
+        rays = (sensor.sample_ray(0, 0.5, centre, (0.5, 0.5))[0] for centre in centres)
+        found = [scene.mitsuba.ray_intersect(ray) for ray in rays]
+        return np.array([si.is_valid() and si.shape in objects for si in found]).reshape(height, width)
+    i = dr.arange(mi.UInt32, width * height)
+    centres = mi.Point2f((mi.Float(i % width) + 0.5) / width, (mi.Float(i // width) + 0.5) / height)
+    rays, _ = sensor.sample_ray(0.0, 0.5, centres, mi.Point2f(0.5))
+    hit = scene.mitsuba.ray_intersect_preliminary(rays)
+    seen = dr.zeros(mi.Bool, width * height)
+    for shape in objects:
+        seen |= hit.is_valid() & (hit.shape == mi.ShapePtr(shape))
+    return np.array(seen).reshape(height, width)

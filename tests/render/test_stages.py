@@ -1,0 +1,85 @@
+"""The scenes by name: what they take, what their masks show, and that they repeat."""
+
+import numpy as np
+import pytest
+from helpers import lambertian_table, must_fail
+
+from sommerl import builtin
+from sommerl.errors import OptionError
+from sommerl.render.environment import default_environment
+from sommerl.render.llvm import mitsuba
+from sommerl.render.meshes import knot
+from sommerl.render.passes import render
+from sommerl.render.scenes import STAGES, stage
+
+mi = mitsuba()
+
+
+def materials(name):
+    return [builtin(material) for material in STAGES[name].materials]
+
+
+def check_same(name, spp, seed=3, other=3):
+    """Not all numbers of samples give the same sums in one pass of Mitsuba's."""
+    scene = stage(name, materials(name), size=40)
+    first, again = render(scene, spp=spp, seed=seed).pixels, render(scene, spp=spp, seed=other).pixels
+    assert np.array_equal(first, again)
+
+
+@pytest.mark.parametrize("name", STAGES)
+def test_same_seed_same_pixels(name):
+    for _ in range(3):
+        check_same(name, 37)
+    must_fail(check_same, name, 37, 3, 4)
+
+
+def test_the_objects_are_what_carries_the_materials():
+    """With black materials, the mask is what no light comes from."""
+    for name in ("statue", "still-life"):
+        scene = stage(name, [lambertian_table(1e-9)] * len(STAGES[name].materials), size=96)
+        image = render(scene, spp=16)
+        assert image.pixels[image.mask].mean() < 0.05 * image.pixels[~image.mask].mean()
+        black = image.pixels.max(axis=-1) < 1e-7
+        edges = sum(np.abs(np.diff(image.mask.astype(int), axis=axis)).sum() for axis in (0, 1))
+        assert (black & ~image.mask).sum() < 0.01 * image.mask.sum()
+        assert (image.mask & ~black).sum() < edges
+
+
+def check_no_holes(brdf):
+    """Hardly any pixel of the statue is black: its front is outside, and its smooth normals face the camera."""
+    image = render(stage("statue", [brdf], environment=np.ones((8, 16, 3), np.float32), size=128), spp=64)
+    assert (image.pixels[image.mask].max(axis=-1) < 0.02).mean() < 1e-3
+
+
+def test_the_statue_has_no_holes():
+    check_no_holes(lambertian_table(0.5))
+    must_fail(check_no_holes, lambertian_table(0.01))
+
+
+def test_a_mesh_stands_on_the_plane_at_unit_height():
+    whole = stage("statue", materials("statue"), size=64)
+    other = stage("statue", materials("statue"), mesh=knot("any name").moved(5, 5, 5), size=64)
+    rows = [np.flatnonzero(render(scene, spp=1).mask.any(axis=1))[[0, -1]] for scene in (whole, other)]
+    assert np.abs(rows[0] - rows[1]).max() <= 3
+
+
+def test_the_same_directions_for_all_materials():
+    """A brighter material gives a brighter image and no other noise: no path ends by what it carries."""
+    environment = default_environment(32)
+    grey, dark = (
+        render(stage("statue", [lambertian_table(albedo)], environment=environment, size=32), spp=4)
+        for albedo in (0.4, 0.2)
+    )
+    inside = np.logical_and.reduce([np.roll(grey.mask, (y, x), (0, 1)) for y in (-1, 0, 1) for x in (-1, 0, 1)])
+    ratio = grey.pixels[inside] / dark.pixels[inside]
+    assert ratio.min() > 1.9999  # and more where light bounces between folds
+    assert ratio.max() > 2.05
+
+
+def test_scenes_refuse_what_they_do_not_take():
+    with pytest.raises(OptionError, match="still-life: expected 3 materials, found 1"):
+        stage("still-life", materials("statue"))
+    with pytest.raises(OptionError, match="expected no environment"):
+        stage("still-life", materials("still-life"), environment=default_environment(16))
+    with pytest.raises(OptionError, match="sphere: expected no mesh"):
+        stage("sphere", materials("sphere"), mesh=knot("knot"))

@@ -1,0 +1,234 @@
+"""The command `render`: scenes, references, folders, and long renders that are killed."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from helpers import must_fail, run, run_json
+
+from sommerl import TrainOptions, builtin_table, save, train
+from sommerl.lattice import Lattice
+from sommerl.render.environment import default_environment
+from sommerl.render.images import encode, write_image
+from sommerl.render.llvm import mitsuba
+from sommerl.render.scenes import STAGES
+
+SMALL = ["--size", "24", "--spp", "4"]
+KEYS = {"image", "seconds", "spp", "variant", "scene", "material", "materials", "sampler", "resumed", "warnings"}
+COMPARE_KEYS = {
+    "psnr_object_db", "psnr_frame_db", "psnr_unrounded_db", "ssim", "delta_e_itp", "flip", "table_rmse",
+    "table_log_error_cosine", "table_relative_error", "reference", "candidate",
+}  # fmt: skip
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+def picture(path):
+    return np.array(mitsuba().Bitmap(str(path)))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Compressed materials, a table, and two files that are none."""
+    folder = tmp_path_factory.mktemp("materials")
+    for name in ("nickel", "pearl-paint"):
+        table = builtin_table(name, lattice=Lattice(30, 30, 30))
+        save(train(table, TrainOptions(clusters=16, epochs=1))[0], folder / f"{name}.smrl")
+    (folder / "broken.smrl").write_bytes(b"SMRL")
+    (folder / "notes.txt").write_text("no material")
+    return folder
+
+
+@pytest.mark.parametrize(("scene", "extension"), [*((name, "png") for name in STAGES), ("grid", "exr")])
+def test_every_scene_renders_with_its_own_materials(capsys, tmp_path, scene, extension):
+    path = tmp_path / f"out.{extension}"
+    result = run_json(capsys, "render", "--scene", scene, "-o", path, *SMALL)
+    assert result.keys() >= KEYS
+    assert (result["scene"], result["warnings"], result["resumed"]) == (scene, [], False)
+    pixels = picture(path)
+    assert pixels.shape == ((48, 120, 3) if scene == "grid" else (24, 24, 3))
+    assert pixels.dtype == (np.uint8 if extension == "png" else np.float32)
+    assert pixels.std() > 0
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_materials_are_put_into_the_scene_in_order(capsys, folder, tmp_path):
+    given = [folder / "pearl-paint.smrl", "chrome"]
+    rest = "-o", tmp_path / "x.png", *SMALL
+    result = run_json(capsys, "render", "--scene", "still-life", *given, *rest)
+    names = [name.split(" ")[0] for name in result["materials"]]
+    assert names == ["pearl-paint", "chrome", "blue-metallic-paint"]
+    # A lookup is for what is given: the scene's own materials are formulas.
+    result = run_json(capsys, "render", "--scene", "still-life", given[0], "--lookup", "trilinear", *rest)
+    assert result["material"].endswith("(trilinear)")
+
+
+def check_folder(capsys, folder, path, names):
+    status, out, err = run(capsys, "render", "--scene", "grid", folder, "-o", path, *SMALL)
+    assert status == 0
+    assert err.count("\n") == 1
+    assert err.startswith(f"warning: {folder / 'broken.smrl'}: expected")
+    assert all(name in out for name in names)
+
+
+def test_a_grid_of_a_folder_names_what_cannot_be_read(capsys, folder, tmp_path):
+    check_folder(capsys, folder, tmp_path / "x.png", ["nickel", "pearl-paint"])
+    must_fail(check_folder, capsys, folder, tmp_path / "x.png", ["chrome"])
+    labelled = picture(tmp_path / "x.png")
+    assert labelled.shape[0] > 24
+    assert labelled.shape[1] == 48
+    letters = labelled[24:, :, 0]
+    assert (letters[:, :24] < 128).any()
+    assert (letters[:, 24:] < 128).any()
+
+
+def test_a_sphere_of_a_grid_is_that_of_the_scene_sphere(capsys, tmp_path):
+    run_json(capsys, "render", "--scene", "grid", "nickel", "chrome", "-o", tmp_path / "grid.exr", *SMALL)
+    run_json(capsys, "render", "chrome", "-o", tmp_path / "one.exr", *SMALL)
+    assert np.array_equal(picture(tmp_path / "grid.exr")[:, 24:], picture(tmp_path / "one.exr"))
+
+
+@pytest.mark.parametrize("scene", ["statue", "still-life", "grid"])
+def test_against_a_reference(capsys, folder, tmp_path, scene):
+    path = tmp_path / "out.png"
+    rest = [] if scene == "statue" else ["chrome"]
+    arguments = ["render", "--scene", scene, folder / "nickel.smrl", *rest, "--against", "nickel", "-o", path]
+    result = run_json(capsys, *arguments, *SMALL)
+    assert result.keys() >= KEYS | COMPARE_KEYS
+    assert 10 < result["psnr_object_db"] < result["psnr_frame_db"] < 80
+    assert result["reference"] == "nickel (SGD stand-in) (formula)"
+    assert result["candidate"] == "nickel (SGD stand-in) (nearest)"
+    files = sorted(file.name for file in tmp_path.iterdir())
+    assert files == ["out.against.png", "out.png", "out.reference.png"]
+    sheet = picture(tmp_path / "out.against.png")
+    assert np.array_equal(sheet[:24, :24], picture(tmp_path / "out.reference.png")[:24, :24])
+
+
+def test_against_itself_nothing_differs(capsys, folder, tmp_path):
+    path, material = tmp_path / "out.exr", folder / "nickel.smrl"
+    result = run_json(capsys, "render", "--scene", "statue", material, "--against", material, "-o", path, *SMALL)
+    assert result["psnr_frame_db"] is None
+    assert (picture(tmp_path / "out.difference.exr") == 0).all()
+    assert np.array_equal(picture(tmp_path / "out.reference.exr"), picture(path))
+
+
+def test_against_is_what_compare_says(capsys, folder, tmp_path):
+    pair = "nickel", folder / "nickel.smrl"
+    compared = run_json(capsys, "compare", *pair, *SMALL)
+    rendered = run_json(capsys, "render", pair[1], "--against", pair[0], "-o", tmp_path / "x.png", *SMALL)
+    assert {key: rendered[key] for key in COMPARE_KEYS} == {key: compared[key] for key in COMPARE_KEYS}
+
+
+def test_several_references(capsys, folder, tmp_path):
+    """The second one stands for the scene's own second material."""
+    start = "render", "--scene", "still-life", folder / "nickel.smrl", "-o", tmp_path / "x.png", *SMALL
+    both = "--against", folder / "pearl-paint.smrl", "--against", "chrome"
+    one, two = run_json(capsys, *start, *both[:2]), run_json(capsys, *start, *both)
+    assert (one["reference"].count(","), two["reference"].count(",")) == (0, 1)
+    assert two["psnr_object_db"] < one["psnr_object_db"]
+
+
+def test_a_mesh_without_normals_renders_and_says_so(capsys, tmp_path):
+    (tmp_path / "mesh.obj").write_text(TRIANGLE)
+    arguments = ["render", "--scene", "statue", "--mesh", tmp_path / "mesh.obj", "-o", tmp_path / "x.png", *SMALL]
+    status, _, err = run(capsys, *arguments)
+    assert status == 0
+    assert err == f"warning: {tmp_path / 'mesh.obj'}: it has no vertex normals: they are computed from its faces\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        (["--scene", "statue", "--mesh", "{}/none.obj"], 1, "none.obj: expected a mesh, found no file"),
+        (["--scene", "statue", "--mesh", "{}/text.obj"], 1, "text.obj: expected triangles, found none"),
+        (["--scene", "sphere", "--mesh", "{}/mesh.obj"], 2, "sphere: expected no --mesh"),
+        (["--scene", "still-life", "--envmap", "{}/light.exr"], 2, "still-life: expected no --envmap"),
+        (["--envmap", "{}/light.png"], 1, "light.png: expected radiance in numbers that go beyond white"),
+        (["--scene", "still-life", "nickel", "nickel", "nickel", "nickel"], 2, "expected at most 3 materials, found 4"),
+        (["nickel", "--against", "nickel", "--against", "nickel"], 2, "expected at most 1 references, found 2"),
+        (["nickel", "--against", "nickle"], 1, "did you mean nickel"),
+        (["--scene", "grid", "nickel", "nickle"], 1, "did you mean nickel"),
+        (["--scene", "grid", "{}/bad"], 1, "expected a folder with materials, found none"),
+        (["--scene", "grid", "{}/empty"], 1, "expected a folder with materials, found none"),
+        (["--scene", "statue", "{}/empty"], 1, "found a directory"),
+        (["--scene", "grid", *["nickel"] * 20, "--size", "2048"], 2, "size: expected at most 1831 for 20 materials"),
+        (["--scene", "statue", "--size", "0"], 2, "size: expected 8 to"),
+        (["--scene", "grid", "--spp", "0"], 2, "spp: expected 1 to"),
+        (["--envmap", "{}/light.exr", "-o", "{}/light.exr"], 2, "expected an output other than the input"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_by_one_sentence(capsys, tmp_path, arguments, status, message):
+    (tmp_path / "mesh.obj").write_text(TRIANGLE)
+    (tmp_path / "text.obj").write_text("no mesh\n")
+    write_image(tmp_path / "light.exr", default_environment(16))
+    (tmp_path / "light.png").write_bytes(encode(np.full((8, 16, 3), 200, np.uint8)))
+    for name in ("bad", "empty"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "bad" / "x.smrl").write_bytes(b"SMRL")
+    before = sorted(tmp_path.rglob("*"))
+    found, out, err = run(capsys, "render", "-o", f"{tmp_path}/x.png", *(each.format(tmp_path) for each in arguments))
+    assert (found, out) == (status, "")
+    lines = err.splitlines()
+    assert lines[-1].startswith("error: ")
+    assert message in lines[-1]
+    assert len(lines) == 1 + ("{}/bad" in arguments)  # a warning of each file, too
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+EAGER = """
+import sys
+from sommerl.render import checkpoint, passes
+checkpoint.SECONDS = 0.0
+passes.SAMPLES_A_PASS = 2**14
+from sommerl.__main__ import main
+sys.exit(main())
+"""
+
+
+def start(*arguments):
+    """The command, which writes its checkpoint after each of many short passes."""
+    return subprocess.Popen(
+        [sys.executable, "-c", EAGER, *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # Where tests run in the background, the signal is ignored, and programs that they start would ignore it, too.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+
+
+@pytest.mark.parametrize("kind", [signal.SIGKILL, signal.SIGINT])
+def test_killed_and_started_again_it_goes_on_to_the_same_image(tmp_path, kind):
+    options = "render", "--scene", "statue", "--size", 32, "--spp", 1024, "--json"
+    whole, path = tmp_path / "whole.exr", tmp_path / "out.exr"
+    part = tmp_path / "out.exr.part"
+    process = start(*options, "-o", path)
+    deadline = time.monotonic() + 60
+    while not part.exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(kind)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode != 0
+    assert part.exists()
+    assert not path.exists()
+    assert (f"{part}: from here, the same command goes on" in err) == (kind == signal.SIGINT)
+    again = start(*options, "-o", path)
+    out, err = again.communicate(timeout=60)
+    assert (again.returncode, err) == (0, "")
+    assert '"resumed": true' in out
+    assert not part.exists()
+    uninterrupted = start(*options, "-o", whole)
+    out, _ = uninterrupted.communicate(timeout=60)
+    assert '"resumed": false' in out
+    assert path.read_bytes() == whole.read_bytes()
+
+
+def test_a_file_in_the_place_of_a_checkpoint_that_is_none(capsys, folder, tmp_path):
+    part = tmp_path / "x.png.part"
+    part.write_bytes(b"something")
+    status, _, err = run(capsys, "render", folder / "nickel.smrl", "-o", tmp_path / "x.png", *SMALL)
+    assert status == 0
+    assert err == f"warning: {part}: expected a checkpoint, found a broken one; the render starts anew\n"
+    assert not part.exists()
