@@ -34,3 +34,9 @@ def stand_in(tmp_path_factory):
 def probe():
     """The light probe of Grace Cathedral."""
     return SHARED / "data" / "env" / "grace_cathedral_latlong.exr"
+
+
+@pytest.fixture(scope="session")
+def buddha():
+    """The Happy Buddha, without normals."""
+    return SHARED / "data" / "meshes" / "happy_buddha_100k.obj"
