@@ -92,6 +92,23 @@ def test_meshes_from_files(tmp_path, extension, text):
     check_closed_and_outward(computed.positions, computed.faces, computed.normals)
 
 
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("zero.ply", ply(OUTWARD, 0 * NORMALS)),
+        ("no_face.obj", obj(OUTWARD) + "vn 0 0 1\n"),
+        ("some_faces.obj", obj(OUTWARD[:2], NORMALS) + obj(OUTWARD[2:]).partition("v 0.0 0.0 1.0\n")[2]),
+    ],
+)
+def test_normals_that_are_none_are_computed(tmp_path, name, text):
+    path = tmp_path / name
+    path.write_text(text)
+    mesh = load_mesh(path)
+    assert "no vertex normals" in mesh.found
+    assert np.allclose(np.linalg.norm(mesh.normals, axis=-1), 1, atol=1e-5)
+    assert (mesh.normals * (mesh.positions - 0.25)).sum(axis=-1).min() > 0
+
+
 def test_inside_out_is_turned(tmp_path):
     path = tmp_path / "mesh.obj"
     path.write_text(obj(OUTWARD[:, ::-1], -NORMALS))

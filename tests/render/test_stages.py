@@ -33,6 +33,15 @@ def test_same_seed_same_pixels(name):
     must_fail(check_same, name, 37, 3, 4)
 
 
+def test_shapes_and_lamps_come_in_the_order_of_the_description():
+    """Mitsuba draws lamps by their number: in another order, the same seed would give another image."""
+    scene = stage("still-life", [lambertian_table()] * 3, size=8)
+    shapes = [shape.id() for shape in scene.mitsuba.shapes()]
+    assert shapes == [*scene.objects, "table", "key", "rim", "front"]
+    lamps = [emitter.get_shape() for emitter in scene.mitsuba.emitters()]
+    assert [lamp.id() for lamp in lamps if lamp] == ["key", "rim", "front"]
+
+
 def test_the_objects_are_what_carries_the_materials():
     """With black materials, the mask is what no light comes from."""
     for name in ("statue", "still-life"):

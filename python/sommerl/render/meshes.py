@@ -14,6 +14,7 @@ from ..errors import FormatError
 from .llvm import mitsuba
 
 HEADER_BYTES = 2**16  # of a PLY file
+SHORTEST = 1e-3  # normal that has a direction
 Floats = NDArray[np.float64]
 
 
@@ -84,7 +85,7 @@ def load_mesh(path: Path) -> Mesh:
     if not np.ptp(positions[:, 1]) > 0:
         raise FormatError(f"{path}: expected a mesh that has a height along y, found a flat one")
     notes: list[str] = []
-    if normals is None or not np.isfinite(normals).all():
+    if normals is None or not (np.abs(normals).max(axis=-1) > SHORTEST).all():  # nor is NaN, which stays NaN
         normals = vertex_normals(positions, faces)
         notes.append("it has no vertex normals: they are computed from its faces")
     if _volume(positions, faces) < 0:
@@ -111,9 +112,13 @@ def _read(path: Path, kind: str) -> tuple[NDArray[np.float32], NDArray[np.uint32
 
 
 def _has_normals(path: Path, kind: str) -> bool:
+    """Whether all faces name normals (OBJ), or all vertices have some (PLY). Others, Mitsuba would leave undefined."""
     with path.open("rb") as file:
         if kind == "obj":
-            return any(line.startswith(b"vn ") for line in file)
+            corners = [
+                line.split(None, 2)[1] for line in file if line.startswith(b"f ") and len(line.split(None, 2)) > 1
+            ]
+            return bool(corners) and all(len(corner.split(b"/")) == 3 for corner in corners)
         return b" nx\n" in file.read(HEADER_BYTES).partition(b"end_header")[0].replace(b"\r", b"")
 
 

@@ -197,7 +197,11 @@ def _scene(
     }
     # Russian roulette would end paths by how dark the material is: the same seed would give other directions to each.
     integrator = {"type": "path", "max_depth": bounces + 1, "rr_depth": bounces + 2}
-    return Scene(mi.load_dict({"type": "scene", "integrator": integrator, "sensor": camera, **things}), objects)
+    # Each thing is made first: from one description, Mitsuba makes lamps in an order that varies from run to run, and
+    # in another order the same seed draws other lamps.
+    made = {name: mi.load_dict(thing) if isinstance(thing, dict) else thing for name, thing in things.items()}
+    description = {"type": "scene", "integrator": integrator, "sensor": camera, **made}
+    return Scene(mi.load_dict(description), objects)
 
 
 def _envmap(environment: NDArray[np.float32]) -> dict[str, Any]:
