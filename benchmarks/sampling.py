@@ -34,7 +34,8 @@ from sommerl.brdf import Brdf
 from sommerl.render.bsdf import upload
 from sommerl.render.environment import default_environment
 from sommerl.render.llvm import drjit, mitsuba
-from sommerl.render.scenes import _mask, sphere
+from sommerl.render.passes import render
+from sommerl.render.scenes import sphere
 from sommerl.sampling.named import OURS, SAMPLERS
 from sommerl.sampling.sampler import Sampler
 
@@ -92,12 +93,13 @@ def errors(
     mi = mitsuba()
     scenes = {name: sphere(one.brdf, environment, sampler=one, size=arguments.size) for name, one in samplers.items()}
     # Pixels of the outline have the noise of what they cover, too.
-    mask = binary_erosion(_mask(next(iter(scenes.values())), arguments.size, arguments.size), np.ones((3, 3)))
+    mask = binary_erosion(render(next(iter(scenes.values())), spp=1).mask, np.ones((3, 3)))
     integrator = mi.load_dict(plugin)
     images: dict[str, list[Any]] = {name: [] for name in scenes}
 
     def shoot(name: str) -> None:
-        pixels = np.array(mi.render(scenes[name], integrator=integrator, spp=arguments.spp, seed=len(images[name])))
+        scene, seed = scenes[name].mitsuba, len(images[name])
+        pixels = np.array(mi.render(scene, integrator=integrator, spp=arguments.spp, seed=seed))
         images[name].append(pixels[mask].astype(np.float64))
 
     for name in scenes:

@@ -17,12 +17,15 @@ from ..sampling.sampler import Sampler
 from .llvm import drjit, mitsuba
 
 
-def make_bsdf(brdf: Brdf, sampler: Sampler | None = None) -> Any:
+def make_bsdf(brdf: Brdf | Any, sampler: Sampler | None = None) -> Any:
     """A Mitsuba BSDF, to be put into a scene's dictionary. Only its front side reflects.
 
+    brdf: what is a Mitsuba BSDF already stays as it is, so that scenes take Mitsuba's own, to compare with.
     sampler: of directions, see `sampling`; ours, fitted to `brdf`, if None. Give the reference's to every candidate
         that it is compared with, so that all are rendered with the same directions.
     """
+    if isinstance(brdf, mitsuba().BSDF):
+        return brdf
     return _plugin()(mitsuba().Properties(), brdf, sampler or named.OURS.fitted(brdf))
 
 

@@ -1,0 +1,175 @@
+"""How long does a render take with each representation, and how long to the same error? The paper's Table 2, from one
+interleaved run.
+
+    uv run python benchmarks/render_time.py MATERIAL... [--scene sphere] [--size 256] [--spp 64] [--rounds 9]
+
+MATERIAL, as a table on MERL's lattice, is rendered as SOM-MAN material (preset paper, M = 256), as compact material of
+8 kB, as raw table of single precision, factored, and as analytic models of two and three lobes fitted to it; and with
+Mitsuba's own `roughplastic` and `diffuse`. Every BRDF draws directions from our sampler, fitted to it; Mitsuba's own
+from theirs. Each is rendered once to compile its kernel, then once in every round.
+
+Times are ratios to that of the SOM-MAN material, as in the paper: median over rounds, least and most. PSNR is over the
+object, against the table, at the table's directions. Error is the variance between rounds, which differ in their
+seeds, over the object's pixels: time to equal error is time times variance, relative to the SOM-MAN material's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from timing import interleaved, ratio, text
+
+import sommerl
+from sommerl import TrainOptions, console, load_table
+from sommerl.brdf import Brdf
+from sommerl.factored.fit import factor
+from sommerl.fitting.fit import fit
+from sommerl.fitting.options import FitOptions
+from sommerl.metrics import image_metrics
+from sommerl.render.llvm import mitsuba
+from sommerl.render.passes import Scene, render
+from sommerl.render.scenes import STAGES, stage
+from sommerl.sampling.named import OURS
+from sommerl.som_man import budget
+from sommerl.som_man.budget import CompactOptions
+
+OURS_NAME = "som-man, M = 256"
+MODELS = (
+    *((name, 2) for name in ("blinn-phong", "phong", "cook-torrance", "ward", "ward-duer", "lafortune")),
+    *((name, 2) for name in ("torrance-sparrow", "ashikhmin-shirley", "ggx")),
+    *((name, 3) for name in ("ward", "cook-torrance")),
+)
+BUILT_IN = {
+    "roughplastic": {"type": "roughplastic", "alpha": 0.1, "distribution": "ggx", "nonlinear": False},
+    "diffuse": {"type": "diffuse"},
+}
+PSNR_SPP = 64
+
+
+def representations(source: str) -> dict[str, Brdf]:
+    """Every way to hold a material, by name; ours first."""
+    table = load_table(source).with_interpolation("nearest")
+    material, _ = sommerl.train(table, TrainOptions())
+    compact, _ = budget.compress(table.with_interpolation("trilinear"), CompactOptions(target_size=8000))
+    found: dict[str, Brdf] = {
+        OURS_NAME: material,
+        "raw table": table,
+        "compact, 8 kB": compact,
+        "factored, 16 × 4": factor(table),
+    }
+    for model, lobes in MODELS:
+        options = FitOptions(lobes=lobes, samples=100_000, starts=6)
+        found[f"{model}, {lobes} lobes"] = fit(table.with_interpolation("trilinear"), model, options).brdf
+    return found
+
+
+def scenes(found: dict[str, Brdf], name: str, size: int) -> dict[str, Scene]:
+    """The scene with each, in all of its places."""
+    mi = mitsuba()
+    places = len(STAGES[name].materials)
+    made = {key: stage(name, [brdf] * places, size=size) for key, brdf in found.items()}
+    return made | {key: stage(name, [mi.load_dict(plugin)] * places, size=size) for key, plugin in BUILT_IN.items()}
+
+
+def qualities(found: dict[str, Brdf], name: str, size: int) -> dict[str, float]:
+    """PSNR over the object against the table, with the table's directions [dB]."""
+    places = len(STAGES[name].materials)
+    samplers = [OURS.fitted(found["raw table"])] * places
+    images = {
+        key: render(stage(name, [brdf] * places, samplers=samplers, size=size), spp=PSNR_SPP)
+        for key, brdf in found.items()
+    }
+    reference = images["raw table"]
+    return {
+        key: image_metrics(reference.pixels, image.pixels, reference.mask).psnr_object_db
+        for key, image in images.items()
+    }
+
+
+def measured(made: dict[str, Scene], arguments: argparse.Namespace) -> dict[str, dict[str, Any]]:
+    """Of each scene: the seconds of every round, and the variance between rounds over the object's pixels."""
+    mi = mitsuba()
+    mask = render(made[OURS_NAME], spp=1).mask
+    images: dict[str, list[Any]] = {name: [] for name in made}
+
+    def shoot(name: str) -> None:
+        pixels = np.array(mi.render(made[name].mitsuba, spp=arguments.spp, seed=len(images[name])))
+        images[name].append(pixels[mask].astype(np.float64))
+
+    for name in made:
+        shoot(name)  # compiles the kernel
+    seconds = interleaved({name: lambda name=name: shoot(name) for name in made}, arguments.rounds)
+    return {
+        name: {"seconds": seconds[name], "variance": float(np.var(np.stack(images[name]), axis=0, ddof=1).mean())}
+        for name in made
+    }
+
+
+def report(found: dict[str, dict[str, Any]], quality: dict[str, float]) -> dict[str, Any]:
+    ours = found[OURS_NAME]
+    seconds = {name: one["seconds"] for name, one in found.items()}
+    result: dict[str, Any] = {}
+    for name, one in found.items():
+        relative = ratio(seconds, name, OURS_NAME)
+        noise = one["variance"] / ours["variance"]
+        result[name] = {"time": relative, "noise": noise, "time to equal error": relative["median"] * noise}
+        result[name]["psnr_object_db"] = quality.get(name)
+    two_lobes = [result[f"{model}, {lobes} lobes"]["time"]["median"] for model, lobes in MODELS if lobes == 2]
+    rivals = [
+        result[f"{model}, {lobes} lobes"]
+        for model, lobes in MODELS
+        if quality[f"{model}, {lobes} lobes"] <= quality[OURS_NAME]
+    ]
+    return {
+        "representations": result,
+        "som-man : raw table": ratio(seconds, OURS_NAME, "raw table"),
+        "som-man : median two-lobe model": 1 / statistics.median(two_lobes),
+        "time to equal error, som-man : best analytic model": 1 / min(one["time to equal error"] for one in rivals),
+        "som-man : roughplastic": ratio(seconds, OURS_NAME, "roughplastic"),
+    }
+
+
+def show(source: str, result: dict[str, Any]) -> None:
+    rows = [
+        [
+            name,
+            text(one["time"]),
+            f"{one['noise']:.2f}",
+            f"{one['time to equal error']:.2f}",
+            "" if one["psnr_object_db"] is None else console.decibels(one["psnr_object_db"]),
+        ]
+        for name, one in result["representations"].items()
+    ]
+    columns = ["", "time : som-man", "variance : som-man", "time to equal error : som-man", "PSNR"]
+    console.print_table(source, columns, rows)
+    summary = {key: value for key, value in result.items() if key != "representations"}
+    shown = {key: text(value) if isinstance(value, dict) else f"{value:.3f}" for key, value in summary.items()}
+    console.print_rows("summary", shown)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("materials", nargs="+", metavar="MATERIAL")
+    parser.add_argument("--scene", choices=[*STAGES], default="sphere")
+    parser.add_argument("--size", type=int, default=256)
+    parser.add_argument("--spp", type=int, default=64)
+    parser.add_argument("--rounds", type=int, default=9)
+    parser.add_argument("--json", type=Path)
+    arguments = parser.parse_args()
+    results: dict[str, Any] = {}
+    for source in arguments.materials:
+        found = representations(source)
+        made = scenes(found, arguments.scene, arguments.size)
+        results[source] = report(measured(made, arguments), qualities(found, arguments.scene, arguments.size))
+        show(source, results[source])
+    if arguments.json:
+        arguments.json.write_text(json.dumps(results, indent=2))
+
+
+if __name__ == "__main__":
+    main()
