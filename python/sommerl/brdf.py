@@ -33,6 +33,11 @@ class Brdf(ABC):
         """What a reader has to report of the data, beyond what it is: see the classes in `formats`."""
         return {}
 
+    @property
+    def reciprocal(self) -> bool:
+        """Whether both orders of the directions give the same."""
+        return True
+
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name!r})"
 
@@ -63,12 +68,21 @@ class Brdf(ABC):
             result[above] = np.concatenate(values)
         return result
 
+    def eval_both_orders(self, wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float64]:
+        """The mean of f_r for both orders of the directions: what a reciprocal representation can hold of it."""
+        f_r = self.eval(wi, wo)
+        return f_r if self.reciprocal else 0.5 * (f_r + self.eval(wo, wi))
+
 
 class OnLattice(Brdf):
     """A BRDF that looks up values of a lattice. The core evaluates it, as `Brdf.eval` does in NumPy."""
 
     interpolation: Interpolation
     source_sha256: str
+
+    @property
+    def reciprocal(self) -> bool:
+        return self.grid is None or self.grid.reciprocal
 
     def eval(self, wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float64]:
         light, viewer = _broadcast(wi, wo)

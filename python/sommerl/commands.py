@@ -231,7 +231,8 @@ def factor(options: Namespace) -> dict[str, Any]:
     check_output(options.output, (".fbrdf",), options.material)
     brdf = load(options.material)
     started = time.perf_counter()
-    material = factored(brdf, chosen)
+    with console.progress(f"factoring {brdf.name}") as advance:
+        material = factored(brdf, chosen, progress=advance)
     seconds = time.perf_counter() - started
     written = fbrdf.save(material, options.output)
     known = describe(material, written)

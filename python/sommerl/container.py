@@ -66,7 +66,10 @@ def load(path: str | Path, longest: int, decode: Callable[[bytes], Material]) ->
 def origin(name: str, source_sha256: str) -> bytes:
     """The name in UTF-8 and the SHA-256 of the source, each after its length; a source may have none."""
     text = name.encode("utf-8", "replace")[:LONGEST_NAME].decode("utf-8", "ignore").encode()
-    digest = bytes.fromhex(source_sha256)
+    try:
+        digest = bytes.fromhex(source_sha256)
+    except ValueError as error:
+        raise FormatError(f"{name}: expected a SHA-256 in hexadecimal digits, found {source_sha256!r}") from error
     if len(digest) not in (0, DIGEST_BYTES):
         raise FormatError(f"{name}: expected a digest of {DIGEST_BYTES} bytes, found {len(digest)}")
     return bytes([len(text)]) + text + bytes([len(digest)]) + digest

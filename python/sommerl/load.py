@@ -9,6 +9,7 @@ from pathlib import Path
 from .brdf import Brdf, OnLattice
 from .errors import FormatError, MaterialError
 from .factored import file as fbrdf
+from .factored.material import FactoredBrdf
 from .formats import arrays_on_disk, cornell, fits, merl, nbrdf, rgl, samples
 from .formats.names import split_member
 from .lattice import Interpolation
@@ -98,7 +99,8 @@ def interpolated(brdf: Brdf, interpolation: Interpolation) -> Brdf:
     """The same material, looked up in another way. Raises MaterialError if it is a formula, or there is no such way."""
     if isinstance(brdf, OnLattice):
         return brdf.with_interpolation(interpolation)
-    raise MaterialError(f"{brdf.name}: expected a table or a compressed material to look up, found a formula")
+    kind = "a factored one" if isinstance(brdf, FactoredBrdf) else "a formula"
+    raise MaterialError(f"{brdf.name}: expected a table or a compressed material to look up, found {kind}")
 
 
 def load_table(source: str | Path) -> BrdfTable:

@@ -57,11 +57,15 @@ class BrdfTable(OnLattice):
 
     @classmethod
     def sample(cls, brdf: Brdf, lattice: Lattice = MERL) -> BrdfTable:
-        """The table of a BRDF's values at the cell centres above the horizon."""
+        """The table of a BRDF's values at the cell centres above the horizon.
+
+        On a reciprocal lattice, the mean of both orders of the directions.
+        """
         above = lattice.above_horizon
         wi, wo = directions(*(angle[above] for angle in lattice.angles()))
         values = np.zeros((*lattice.shape, 3))
-        values[above] = brdf.eval(np.stack(wi, -1), np.stack(wo, -1))
+        found = brdf.eval_both_orders if lattice.reciprocal else brdf.eval
+        values[above] = found(np.stack(wi, -1), np.stack(wo, -1))
         return cls(values, lattice, name=brdf.name)
 
     @classmethod

@@ -121,11 +121,11 @@ def a_scale(value):
     ("change", "message"),
     [
         *((a_value(value), "values from 0 to 1") for value in (np.nan, np.inf, -0.5, 1.01)),
-        *((a_scale(value), "scales that are finite") for value in (np.nan, np.inf, -1.0)),
+        *((a_scale(value), "scales from 0 to") for value in (np.nan, np.inf, -1.0, 2e30)),
     ],
 )
 def test_bad_values_are_refused(change, message):
-    check_same(decode(with_values(nothing)), decode(with_values(nothing)))
+    assert decode(with_values(nothing)).terms == (1, 1)
     with pytest.raises(FormatError, match=message):
         decode(with_values(change))
 

@@ -22,8 +22,7 @@ from .. import container
 from ..container import Reader
 from ..errors import FormatError, SommerlError
 from ..files import atomic_write
-from .fit import MOST
-from .material import COLUMNS, ELEVATIONS, ROWS, FactoredBrdf
+from .material import COLUMNS, ELEVATIONS, MOST, ROWS, FactoredBrdf
 
 MAGIC = b"FBRD"
 VERSION = 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,15 +13,15 @@ from ..brdf import Brdf
 from ..errors import OptionError
 from ..half_diff import spherical
 from ..optional import optional
-from .material import COLUMNS, ELEVATIONS, LEAST_COSINE, PI, ROWS, FactoredBrdf
+from .material import COLUMNS, ELEVATIONS, LEAST_COSINE, MOST, MOST_TERMS, PI, ROWS, FactoredBrdf
 
-MOST = 32  # lobes, and terms of a lobe
 FIRST_ITERATIONS, ITERATIONS = 200, 100
 BELOW = 0.01  # weight of half vectors that mirror the viewer below the horizon
 DARK = 1e-4  # of the largest value: what is darker does not count more
 TINY = 1e-300  # added to divisors that may be 0
 
 Matrix = NDArray[np.float64]
+Progress = Callable[[int, int], None]  #: iterations done, iterations in all
 
 
 @dataclass(frozen=True)
@@ -34,15 +35,18 @@ class FactorOptions:
         for name, value in vars(self).items():
             if not 1 <= value <= MOST:
                 raise OptionError(f"{name}: expected 1 to {MOST}, found {value}")
+        if self.lobes * self.terms > MOST_TERMS:
+            raise OptionError(f"terms: expected at most {MOST_TERMS} of all lobes, found {self.lobes * self.terms}")
 
 
-def factor(brdf: Brdf, options: FactorOptions | None = None) -> FactoredBrdf:
+def factor(brdf: Brdf, options: FactorOptions | None = None, *, progress: Progress | None = None) -> FactoredBrdf:
     """Factors a BRDF, which is evaluated for 138,240 pairs of directions.
 
     As Lawrence et al. (2004) do, the matrix of elevations by half vectors is factored first, then each lobe's table of
     θ_h by φ_h, with rows and columns scaled so that the dark ones count. The iterations after it are our own: they fit
-    all factors together. What is below the horizon, which no evaluation reads, is to be 0, so that sampling does not
-    draw it, but counts little, so that it costs no accuracy. Raises MissingDependencyError without scikit-learn.
+    all factors together. What is below the horizon, which no evaluation reads, is to be 0, so that sampling draws
+    little of it, but counts little, so that it costs little accuracy. Raises MissingDependencyError without
+    scikit-learn.
     """
     options = options or FactorOptions()
     data, above = _light(brdf)
@@ -51,7 +55,7 @@ def factor(brdf: Brdf, options: FactorOptions | None = None) -> FactoredBrdf:
     f, g = f / rows, g / columns
     lobes = [_split(lobe, options.terms) for lobe in g.reshape(-1, ROWS, COLUMNS)]
     u, v = (np.stack(parts, axis=1) for parts in zip(*lobes, strict=True))
-    f, u, v = _refined(data, np.where(above, 1.0, BELOW) * (rows * columns) ** 2, f, u, v)
+    f, u, v = _refined(data, np.where(above, 1.0, BELOW) * (rows * columns) ** 2, f, u, v, progress)
     tops = [part.max(axis=0) for part in (f, u, v)]
     f, u, v = (part / np.where(top > 0, top, 1.0) for part, top in zip((f, u, v), tops, strict=True))
     by_lobe = np.moveaxis(f.reshape(ELEVATIONS, 3, -1), 1, 2)
@@ -76,7 +80,7 @@ def _light(brdf: Brdf) -> tuple[Matrix, NDArray[np.bool_]]:
 
 
 def _scales(data: Matrix) -> tuple[Matrix, Matrix]:
-    """Factors for the rows and for the columns, whose means are then alike; 1 for all of black data."""
+    """Factors for the rows and for the columns, whose means are then alike; finite ones for black data."""
     least = DARK * data.max() or 1.0
     columns = 1 / np.maximum(data.mean(axis=0, keepdims=True), least)
     return 1 / np.maximum((data * columns).mean(axis=1, keepdims=True), DARK), columns
@@ -99,7 +103,9 @@ def _split(lobe: Matrix, terms: int) -> tuple[Matrix, Matrix]:
     return u / scale, v.T
 
 
-def _refined(data: Matrix, weights: Matrix, f: Matrix, u: Matrix, v: Matrix) -> tuple[Matrix, Matrix, Matrix]:
+def _refined(
+    data: Matrix, weights: Matrix, f: Matrix, u: Matrix, v: Matrix, progress: Progress | None
+) -> tuple[Matrix, Matrix, Matrix]:
     """Multiplicative updates (Lee & Seung 2001) of each factor in turn, for the weighted squared error."""
     target = weights * data
 
@@ -108,7 +114,9 @@ def _refined(data: Matrix, weights: Matrix, f: Matrix, u: Matrix, v: Matrix) -> 
         now = weights * (f @ _lobes(u, v))
         return (f.T @ target).reshape(-1, ROWS, COLUMNS), (f.T @ now).reshape(-1, ROWS, COLUMNS)
 
-    for _ in range(ITERATIONS):
+    for number in range(ITERATIONS):
+        if progress:
+            progress(number, ITERATIONS)
         g = _lobes(u, v)
         f = f * (target @ g.T) / ((weights * (f @ g)) @ g.T + TINY)
         up, down = gradients(f, u, v)

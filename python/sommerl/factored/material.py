@@ -26,6 +26,8 @@ ROWS, COLUMNS = 90, 48  # of θ_h, equal in √θ_h as MERL's bins are; of φ_h,
 LEAST_COSINE = 0.03  # C
 UPRIGHT = 1e-9  # added to lengths along x, so that the azimuth of the normal itself is defined
 PI = np.pi
+MOST, MOST_TERMS = 32, 256  # lobes, and terms of a lobe; terms of all lobes, each of which is looked up
+LARGEST_SCALE = 1e30  # renderers calculate in single precision
 
 
 class FactoredBrdf(Brdf):
@@ -55,11 +57,17 @@ class FactoredBrdf(Brdf):
             raise MaterialError(f"factors: expected shapes that fit together, found {found}")
         if not all(((part >= 0) & (part <= 1)).all() for part in (lobes, rows, columns)):
             raise MaterialError("factors: expected values from 0 to 1, found others")
-        if not (np.isfinite(scale).all() and (scale >= 0).all()):
-            raise MaterialError("factors: expected scales that are finite and not negative, found others")
+        if max(terms) > MOST or scale.size > MOST_TERMS:
+            raise MaterialError(f"factors: expected at most {MOST} × {MOST} and {MOST_TERMS} terms, found {terms}")
+        if not ((scale >= 0) & (scale <= LARGEST_SCALE)).all():
+            raise MaterialError(f"factors: expected scales from 0 to {LARGEST_SCALE:g}, found others")
         self.name, self.source_sha256 = name, source_sha256
         self.lobes, self.rows, self.columns = (part.astype(np.float16) for part in (lobes, rows, columns))
         self.scale = scale.astype(np.float32)
+
+    @property
+    def reciprocal(self) -> bool:
+        return False
 
     @property
     def terms(self) -> tuple[int, int]:

@@ -57,7 +57,7 @@ class RglBrdf(Brdf):
         source_sha256: str = "",
     ) -> None:
         self.name = name
-        self.reciprocal = reciprocal
+        self._reciprocal = reciprocal
         self.source_sha256 = source_sha256
         self._theta_i = np.asarray(theta_i, np.float64)
         self._shapes = {"vndf": vndf.shape[1:], "rgb": rgb.shape[2:], "ndf": ndf.shape, "sigma": sigma.shape}
@@ -72,6 +72,10 @@ class RglBrdf(Brdf):
             "sigma": np.asarray(sigma, np.float64).reshape(-1),
             "theta_i": self._theta_i,
         }
+
+    @property
+    def reciprocal(self) -> bool:
+        return self._reciprocal
 
     def buffers(self) -> dict[str, NDArray[Any]]:
         return self._buffers

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, Triple, ops
 from ..brdf import Brdf, Buffers
-from ..factored.fit import factor
+from ..factored.fit import FactorOptions, factor
 from ..factored.material import (
     COLUMNS,
     ELEVATIONS,
@@ -35,6 +35,7 @@ from ..half_diff import TWO_PI
 from .sampler import PI, Sampler
 from .tables import cumulative, inverted
 
+FEW = FactorOptions(4, 2)  # for sampling alone: more terms bring less, at equal time, than they cost
 DIFFUSE = 0.01  # share of directions that follow the cosine, as in ours
 
 
@@ -59,11 +60,15 @@ class LawrenceSampler(Sampler):
     @classmethod
     def fitted(cls, brdf: Brdf) -> LawrenceSampler:
         """The sampler of a BRDF, which is factored if it is not yet. Raises MissingDependencyError as `factor` does."""
-        factored = brdf if isinstance(brdf, FactoredBrdf) else factor(brdf)
+        return cls.of(brdf, brdf if isinstance(brdf, FactoredBrdf) else factor(brdf, FEW))
+
+    @classmethod
+    def of(cls, brdf: Brdf, factored: FactoredBrdf) -> LawrenceSampler:
+        """The sampler that draws, for a BRDF, from a factored form of it."""
         u, v = (part.astype(np.float64).reshape(len(part), -1).T for part in (factored.rows, factored.columns))
         bands = _bands()
-        mass = factored.scale.reshape(-1) * (u @ bands) * v.sum(axis=1)
-        mass = mass if mass.any() else np.ones_like(mass)
+        mass = factored.scale.reshape(-1).astype(np.float64) * (u @ bands) * v.sum(axis=1)
+        mass = mass / mass.sum() if mass.any() else np.full_like(mass, 1 / len(mass))
         lobes = factored.lobes.astype(np.float64).mean(axis=-1)
         black = ~(lobes.repeat(factored.terms[1], axis=1) * mass).any(axis=1, keepdims=True)
         share: NDArray[np.float64] = np.where(black, 1.0, lobes)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Triple
-from ..brdf import Brdf, OnLattice
+from ..brdf import Brdf
 from ..errors import MaterialError
 from ..half_diff import directions
 from ..nodes import ABOVE, BELOW, FINE, KNEE, SMALLEST_COSINE, FittedTable, NodeLattice, angles_at, damped
@@ -47,8 +47,6 @@ class Fitter:
 
     def __init__(self, brdf: Brdf, *, seed: int = 0) -> None:
         self._brdf = brdf
-        grid = brdf.grid if isinstance(brdf, OnLattice) else None
-        self._one_way = grid is not None and not grid.reciprocal
         self._sparse, self._solvers = (
             optional(module, "SciPy", "fitting", "formats") for module in ("scipy.sparse", "scipy.sparse.linalg")
         )
@@ -102,13 +100,8 @@ class Fitter:
         wi, wo = directions(*angles_at(*np.meshgrid(x, y, z, indexing="ij")))
         f_r = np.zeros((*wi[0].shape, 3))
         seen = np.minimum(wi[2], wo[2]) > SMALLEST_COSINE
-        f_r[seen] = self._eval(*(np.stack([c[seen] for c in w], axis=-1) for w in (wi, wo)))
+        f_r[seen] = self._brdf.eval_both_orders(*(np.stack([c[seen] for c in w], axis=-1) for w in (wi, wo)))
         return wi, wo, f_r * damped(wi, wo)[..., None]
-
-    def _eval(self, wi: Array, wo: Array) -> Array:
-        """The source; the mean of both orders, where it is not reciprocal, for the fit is."""
-        f_r = self._brdf.eval(wi, wo)
-        return 0.5 * (f_r + self._brdf.eval(wo, wi)) if self._one_way else f_r
 
     def _grid(self, x: Array, y: Array, z: Array) -> _Grid:
         return self._scaled(x, y, z, *self._source(x, y, z))
@@ -128,7 +121,7 @@ class Fitter:
         above = np.minimum(wi[2], wo[2]) > 1e-4
         self._places = x[above], y[above], z[above]
         wi, wo = ((w[0][above], w[1][above], w[2][above]) for w in (wi, wo))
-        f_r = self._eval(np.stack(wi, axis=-1), np.stack(wo, axis=-1))
+        f_r = self._brdf.eval_both_orders(np.stack(wi, axis=-1), np.stack(wo, axis=-1))
         self._targets = np.cbrt(f_r * (damped(wi, wo) / self.scale)[:, None])
         weight = _measure(*self._places, wi, wo) ** MEASURE_POWER
         self._weights = weight / weight.mean()
