@@ -137,12 +137,14 @@ def report(found: dict[str, dict[str, Any]], quality: dict[str, float]) -> dict[
         for model, lobes in MODELS
         if quality[f"{model}, {lobes} lobes"] <= quality[OURS_NAME]
     ]
+    best = max(rivals, key=lambda one: one["error"], default=None)
     return {
         "representations": result,
         "som-man : raw table": ratio(seconds, OURS_NAME, "raw table"),
         "som-man : median two-lobe model": 1 / statistics.median(two_lobes),
-        "time to equal error, som-man : best analytic model": max(one["error"] for one in rivals),
-        "time to equal noise, som-man : best analytic model": max(one["noise"] for one in rivals),
+        "time to equal error, som-man : best model of equal or worse PSNR": best and best["error"],
+        "time to equal noise, som-man : that model": best and best["noise"],
+        "models of better PSNR": len(MODELS) - len(rivals),
         "som-man : roughplastic": ratio(seconds, OURS_NAME, "roughplastic"),
     }
 
@@ -161,7 +163,10 @@ def show(source: str, result: dict[str, Any]) -> None:
     columns = ["", "time : som-man", "som-man : it, to equal noise", "som-man : it, to equal error", "PSNR"]
     console.print_table(source, columns, rows)
     summary = {key: value for key, value in result.items() if key != "representations"}
-    shown = {key: text(value) if isinstance(value, dict) else f"{value:.3f}" for key, value in summary.items()}
+    shown = {
+        key: text(value) if isinstance(value, dict) else "none" if value is None else f"{value:.3g}"
+        for key, value in summary.items()
+    }
     console.print_rows("summary", shown)
 
 
@@ -180,8 +185,8 @@ def main() -> None:
         made = scenes(found, arguments.scene, arguments.size)
         results[source] = report(measured(made, arguments), qualities(found, arguments.scene, arguments.size))
         show(source, results[source])
-    if arguments.json:
-        arguments.json.write_text(json.dumps(results, indent=2))
+        if arguments.json:  # after each, so that nothing is lost
+            arguments.json.write_text(json.dumps(results, indent=2))
 
 
 if __name__ == "__main__":

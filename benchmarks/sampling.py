@@ -31,11 +31,13 @@ from timing import interleaved
 import sommerl
 from sommerl import console
 from sommerl.brdf import Brdf
+from sommerl.factored.fit import factor
 from sommerl.render.bsdf import upload
 from sommerl.render.environment import default_environment
 from sommerl.render.llvm import drjit, mitsuba
 from sommerl.render.passes import render
 from sommerl.render.scenes import sphere
+from sommerl.sampling.lawrence import LawrenceSampler
 from sommerl.sampling.named import OURS, SAMPLERS
 from sommerl.sampling.sampler import Sampler
 
@@ -44,6 +46,7 @@ WEIGHT_ANGLES = (0, 15, 30, 45, 55, 65, 70, 75, 80, 82, 84, 85)
 DRAWS = 10**6
 LANES = 2**22
 COST_ROUNDS = 9
+LARGE = "lawrence, 16 × 4"  # from the factors that evaluation has, where `lawrence` itself takes 4 × 2
 
 
 def even_environment() -> Any:
@@ -134,7 +137,8 @@ def costs(samplers: dict[str, Sampler]) -> dict[str, float]:
 
 
 def measured(brdf: Brdf, arguments: argparse.Namespace) -> dict[str, Any]:
-    samplers = {name: kind.fitted(brdf) for name, kind in SAMPLERS.items()}
+    samplers: dict[str, Sampler] = {name: kind.fitted(brdf) for name, kind in SAMPLERS.items()}
+    samplers[LARGE] = LawrenceSampler.of(brdf, factor(brdf))
     row = {name: statistics_of(sampler) for name, sampler in samplers.items()}
     for name, seconds in costs(samplers).items():
         row[name]["cost"] = seconds
@@ -171,8 +175,10 @@ def report(rows: dict[str, Any]) -> dict[str, Any]:
         ]
         columns = ["sampler", f"variance at {VARIANCE_ANGLES}°", "largest weight"]
         console.print_table(material, [*columns, *(f"{quantity} : cosine" for quantity in QUANTITIES[1:])], table)
-    means = {f"{name} : cosine": ratios(rows, name, "cosine") for name in SAMPLERS if name != "cosine"}
-    means |= {f"{OURS.name} : {name}": ratios(rows, OURS.name, name) for name in SAMPLERS if name != OURS.name}
+    means = {f"{name} : cosine": ratios(rows, name, "cosine") for name in (*SAMPLERS, LARGE) if name != "cosine"}
+    means |= {
+        f"{OURS.name} : {name}": ratios(rows, OURS.name, name) for name in (*SAMPLERS, LARGE) if name != OURS.name
+    }
     table = [[name, *(f"{value:.3g}" for value in found.values())] for name, found in means.items()]
     console.print_table("geometric means", ["samplers", *QUANTITIES], table)
     return means
