@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from ..errors import FormatError, MaterialError
-from ..files import atomic_write
+from ..files import atomic_write, visible
 from ..models.multi_lobe import FAMILIES, Lobe, MultiLobe
-from .names import visible
 
 KEY, VERSION = "sommerl_fits", 1
 LARGEST_FILE = 2**24  # bytes

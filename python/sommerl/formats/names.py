@@ -12,11 +12,6 @@ def printable(name: str) -> str:
     return os.fsencode(name).decode("utf-8", "replace")
 
 
-def visible(name: str) -> str:
-    """A name without the characters that cannot be printed: terminals obey some of them."""
-    return "".join(c if c.isprintable() else "�" for c in name)
-
-
 def split_member(source: str | Path) -> tuple[Path, str]:
     """A file, and which of the materials in it: "FILE:NAME", where FILE exists and "FILE:NAME" does not."""
     text = str(source)
