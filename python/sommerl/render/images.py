@@ -82,17 +82,18 @@ def captioned(pictures: Sequence[tuple[str, NDArray[np.uint8]]], columns: int, n
     figure = figures.Figure(figsize=((whole[0] + 0.5) / 100, (whole[1] + 0.5) / 100), dpi=100)
     canvas = agg.FigureCanvasAgg(figure)
 
-    def write(x: float, y: float, words: str) -> None:
+    def write(x: float, y: float, words: str, room: int) -> None:
         # No mathematics: a dollar or an underscore in a name is one.
         x, y = x / whole[0], 1 - y / whole[1]
-        figure.text(x, y, words, fontsize=0.72 * text, ha="center", va="center", parse_math=False)
+        size = min(text, 1.7 * room / len(words))  # letters are about half as wide as high
+        figure.text(x, y, words, fontsize=0.72 * size, ha="center", va="center", parse_math=False)
 
     for number, (caption, picture) in enumerate(pictures):
         x, y = number % columns * width, number // columns * step
         sheet[y : y + height, x : x + width] = picture
-        write(x + width / 2, y + height + band / 2, shortened(caption, int(1.9 * width / text)))
+        write(x + width / 2, y + height + band / 2, shortened(caption, int(1.9 * width / text)), width)
     if note:
-        write(whole[0] / 2, whole[1] - band / 2, note)
+        write(whole[0] / 2, whole[1] - band / 2, note, whole[0])
     canvas.draw()
     drawn = np.asarray(canvas.buffer_rgba())[: whole[1], : whole[0], :3]
     return np.minimum(drawn, sheet)  # letters are darker than the bands that they stand on
