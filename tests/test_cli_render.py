@@ -1,9 +1,4 @@
-"""The command `render`: scenes, references, folders, and long renders that are killed."""
-
-import signal
-import subprocess
-import sys
-import time
+"""The command `render`: scenes, references, and folders."""
 
 import numpy as np
 import pytest
@@ -11,8 +6,9 @@ from helpers import must_fail, run, run_json
 
 from sommerl import TrainOptions, builtin_table, save, train
 from sommerl.lattice import Lattice
+from sommerl.metrics import flip_map
 from sommerl.render.environment import default_environment
-from sommerl.render.images import encode, write_image
+from sommerl.render.images import encode, signed_difference, write_image
 from sommerl.render.llvm import mitsuba
 from sommerl.render.scenes import STAGES
 
@@ -136,6 +132,8 @@ def test_a_mesh_without_normals_renders_and_says_so(capsys, tmp_path):
     status, _, err = run(capsys, *arguments)
     assert status == 0
     assert err == f"warning: {tmp_path / 'mesh.obj'}: it has no vertex normals: they are computed from its faces\n"
+    run_json(capsys, "render", "--scene", "statue", "-o", tmp_path / "own.png", *SMALL)
+    assert not np.array_equal(picture(tmp_path / "x.png"), picture(tmp_path / "own.png"))
 
 
 @pytest.mark.parametrize(
@@ -146,8 +144,12 @@ def test_a_mesh_without_normals_renders_and_says_so(capsys, tmp_path):
         (["--scene", "sphere", "--mesh", "{}/mesh.obj"], 2, "sphere: expected no --mesh"),
         (["--scene", "still-life", "--envmap", "{}/light.exr"], 2, "still-life: expected no --envmap"),
         (["--envmap", "{}/light.png"], 1, "light.png: expected radiance in numbers that go beyond white"),
-        (["--scene", "still-life", "nickel", "nickel", "nickel", "nickel"], 2, "expected at most 3 materials, found 4"),
-        (["nickel", "--against", "nickel", "--against", "nickel"], 2, "expected at most 1 references, found 2"),
+        (
+            ["--scene", "still-life", "nickel", "nickel", "nickel", "nickel"],
+            2,
+            "materials: expected at most 3 in still-life, found 4",
+        ),
+        (["nickel", "--against", "nickel", "--against", "nickel"], 2, "against: expected at most 1, found 2"),
         (["nickel", "--against", "nickle"], 1, "did you mean nickel"),
         (["--scene", "grid", "nickel", "nickle"], 1, "did you mean nickel"),
         (["--scene", "grid", "{}/bad"], 1, "expected a folder with materials, found none"),
@@ -177,58 +179,68 @@ def test_what_makes_no_sense_is_refused_by_one_sentence(capsys, tmp_path, argume
     assert sorted(tmp_path.rglob("*")) == before
 
 
-EAGER = """
-import sys
-from sommerl.render import checkpoint, passes
-checkpoint.SECONDS = 0.0
-passes.SAMPLES_A_PASS = 2**14
-from sommerl.__main__ import main
-sys.exit(main())
-"""
+def test_the_three_images_of_a_comparison(capsys, folder, tmp_path):
+    """By cosine sampling, whose directions are the same for all: the render, the reference, and the first minus the
+    second."""
+    options = "--scene", "statue", "--sampler", "cosine", *SMALL
+    own, reference = folder / "nickel.smrl", "chrome"
+    run_json(capsys, "render", own, "--against", reference, "-o", tmp_path / "x.exr", *options)
+    for name, brdf in (("x.exr", own), ("x.reference.exr", reference)):
+        run_json(capsys, "render", brdf, "-o", tmp_path / "alone.exr", *options)
+        assert np.array_equal(picture(tmp_path / name), picture(tmp_path / "alone.exr"))
+    a, b = picture(tmp_path / "x.exr"), picture(tmp_path / "x.reference.exr")
+    assert np.array_equal(picture(tmp_path / "x.difference.exr"), a - b)
+    assert abs(a - b).max() > 0.01
 
 
-def start(*arguments):
-    """The command, which writes its checkpoint after each of many short passes."""
-    return subprocess.Popen(
-        [sys.executable, "-c", EAGER, *map(str, arguments)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        # Where tests run in the background, the signal is ignored, and programs that they start would ignore it, too.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
+def test_the_four_panels_of_a_comparison(capsys, folder, tmp_path):
+    run_json(capsys, "render", folder / "nickel.smrl", "--against", "chrome", "-o", tmp_path / "x.png", *SMALL)
+    a, b = picture(tmp_path / "x.reference.png"), picture(tmp_path / "x.png")
+    sheet = picture(tmp_path / "x.against.png")
+    panels = [sheet[:24, 24 * k : 24 * (k + 1)] for k in range(4)]
+    for panel, expected in zip(panels, (a, b, signed_difference(a, b), flip_map(a, b)), strict=True):
+        assert np.array_equal(panel, expected)
+    must_fail(lambda: np.testing.assert_array_equal(panels[2], signed_difference(b, a)))
 
 
-@pytest.mark.parametrize("kind", [signal.SIGKILL, signal.SIGINT])
-def test_killed_and_started_again_it_goes_on_to_the_same_image(tmp_path, kind):
-    options = "render", "--scene", "statue", "--size", 32, "--spp", 1024, "--json"
-    whole, path = tmp_path / "whole.exr", tmp_path / "out.exr"
-    part = tmp_path / "out.exr.part"
-    process = start(*options, "-o", path)
-    deadline = time.monotonic() + 60
-    while not part.exists() and time.monotonic() < deadline:
-        time.sleep(0.01)
-    process.send_signal(kind)
-    _, err = process.communicate(timeout=60)
-    assert process.returncode != 0
-    assert part.exists()
-    assert not path.exists()
-    assert (f"{part}: from here, the same command goes on" in err) == (kind == signal.SIGINT)
-    again = start(*options, "-o", path)
-    out, err = again.communicate(timeout=60)
-    assert (again.returncode, err) == (0, "")
-    assert '"resumed": true' in out
-    assert not part.exists()
-    uninterrupted = start(*options, "-o", whole)
-    out, _ = uninterrupted.communicate(timeout=60)
-    assert '"resumed": false' in out
-    assert path.read_bytes() == whole.read_bytes()
+def test_only_spheres_with_a_reference_are_measured(capsys, folder, tmp_path):
+    own, path = folder / "nickel.smrl", tmp_path / "x.png"
+    alone = run_json(capsys, "render", own, "--against", "nickel", "-o", path, *SMALL)
+    rest = "chrome", "pearl-paint", "--scene", "grid"
+    grid = run_json(capsys, "render", own, *rest, "--against", "nickel", "-o", path, *SMALL)
+    assert {key: grid[key] for key in COMPARE_KEYS} == {key: alone[key] for key in COMPARE_KEYS}
 
 
-def test_a_file_in_the_place_of_a_checkpoint_that_is_none(capsys, folder, tmp_path):
-    part = tmp_path / "x.png.part"
-    part.write_bytes(b"something")
-    status, _, err = run(capsys, "render", folder / "nickel.smrl", "-o", tmp_path / "x.png", *SMALL)
-    assert status == 0
-    assert err == f"warning: {part}: expected a checkpoint, found a broken one; the render starts anew\n"
-    assert not part.exists()
+def test_a_label_stands_under_its_sphere(capsys, tmp_path):
+    def labels(*names):
+        run_json(capsys, "render", "--scene", "grid", *names, "-o", tmp_path / "x.png", "--size", 96, "--spp", 1)
+        sheet = picture(tmp_path / "x.png")[96:]
+        return sheet[:, :96], sheet[:, 96:]
+
+    both, first, second = labels("nickel", "chrome"), labels("nickel", "nickel"), labels("chrome", "chrome")
+    assert np.array_equal(both[0], first[0])
+    assert np.array_equal(both[1], second[1])
+    assert not np.array_equal(both[0], second[0])
+
+
+def test_inputs_are_never_written_over(capsys, folder, tmp_path):
+    material = (folder / "nickel.smrl").read_bytes()
+    light, own = tmp_path / "x.reference.exr", tmp_path / "m.png"
+    write_image(light, default_environment(16))
+    before = light.read_bytes()
+    part = tmp_path / "x.exr.sommerl-part"
+    for path in (own, part):
+        path.write_bytes(material)
+    options = "-o", tmp_path / "x.exr", *SMALL
+    for arguments in (
+        ("render", "nickel", "--against", "chrome", "--envmap", light, *options),
+        ("render", part, *options),
+        ("compare", own, "nickel", "-o", own, *SMALL),
+        ("compare", "nickel", own, "-o", own, *SMALL),
+    ):
+        status, _, err = run(capsys, *arguments)
+        assert status == 2
+        assert "expected an output other than the input" in err
+    assert light.read_bytes() == before
+    assert own.read_bytes() == part.read_bytes() == material
+    assert not (tmp_path / "x.exr").exists()

@@ -248,7 +248,7 @@ def _render(add: Any) -> None:
         "apart; given again: in place of the second one, and so on",
     )
     command.add_argument(
-        "--mesh", type=Path, metavar="FILE", help="statue: a mesh, .obj or .ply, y up (a built-in one)"
+        "--mesh", type=Path, metavar="FILE", help="statue: a mesh of triangles, .obj or .ply, y up (a built-in one)"
     )
     command.add_argument(
         "--lookup",

@@ -167,7 +167,7 @@ def info(options: Namespace) -> dict[str, Any]:
 
 def compare(options: Namespace) -> dict[str, Any]:
     if options.output:
-        check_output(options.output, (".png",))
+        check_output(options.output, (".png",), options.reference, options.candidate, options.envmap)
     reference, candidate = alike(load(options.reference), load(options.candidate), options.lookup)
     check_rendering(options)
     environment = environment_of(options)
@@ -296,14 +296,20 @@ def table_distance(reference: Brdf, candidate: Brdf) -> dict[str, float]:
     return asdict(table_metrics(first.values, second.values, first.lattice))
 
 
-def check_output(path: Path, extensions: tuple[str, ...], source: str = "") -> None:
-    """Says before long work what would go wrong after it."""
+def check_output(path: Path, extensions: tuple[str, ...], *sources: str | Path | None) -> None:
+    """Says before long work what would go wrong after it. sources: what is read, and so not to be written."""
     if path.suffix.lower() not in extensions:
         raise OptionError(f"{path}: expected a name that ends in {' or '.join(extensions)}, found {path.suffix!r}")
-    file = split_member(source)[0]
-    if source and path.exists() and file.exists() and path.samefile(file):
-        raise OptionError(f"{path}: expected an output other than the input")
+    check_apart(path, *sources)
     check_writable(path)
+
+
+def check_apart(path: Path, *sources: str | Path | None) -> None:
+    """Raises OptionError if a file that is to be written is one of those that are read."""
+    for source in sources:
+        file = split_member(source)[0] if source else None
+        if file and path.exists() and file.exists() and path.samefile(file):
+            raise OptionError(f"{path}: expected an output other than the input")
 
 
 def check_rendering(options: Namespace) -> None:

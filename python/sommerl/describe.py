@@ -71,6 +71,8 @@ def lookup(brdf: Brdf) -> str:
     """How a material is looked up."""
     if isinstance(brdf, OnLattice):
         return brdf.interpolation
+    if isinstance(brdf, RglBrdf):
+        return "measurement"
     return "factored" if isinstance(brdf, FactoredBrdf) else "formula"
 
 

@@ -21,7 +21,7 @@ def atomic_write(path: Path) -> Generator[BinaryIO]:
     with _named(path):
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".sommerl-")
     try:
-        with os.fdopen(handle, "wb") as out:
+        with _named(path), os.fdopen(handle, "wb") as out:
             yield out
         umask = os.umask(0)
         os.umask(umask)

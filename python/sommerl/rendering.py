@@ -7,7 +7,7 @@ import sys
 import time
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from . import console
 from .brdf import Brdf
-from .commands import alike, check_output, check_rendering, environment_of, stem, table_distance
+from .commands import alike, check_apart, check_output, check_rendering, environment_of, stem, table_distance
 from .describe import image_rows, label, table_rows
 from .errors import MaterialError, OptionError, SommerlError
 from .load import EXTENSIONS, interpolated, load
 from .materials import NAMES
 from .metrics import exposure, flip_map, to_srgb8
-from .render.checkpoint import Checkpoint, Image, content, content_of
+from .render.checkpoint import Checkpoint, Image, checkpoint_of, content, content_of
 from .render.compare import Comparison
 from .render.images import DIFFERENCE_GAIN, captioned, signed_difference, tiled, write_image
 from .render.llvm import mitsuba
@@ -31,9 +31,11 @@ from .render.meshes import Mesh, load_mesh
 from .render.passes import Scene, render_all
 from .render.scenes import STAGES, stage
 from .sampling import named
+from .sampling.sampler import Sampler
 
 GRID = "grid"
 MOST_PIXELS = 2**26  # of a sheet
+MOST_COMPARED = 2**23  # of one that is compared: the metrics take some 260 bytes for each
 WIDEST = 2048  # pixels that the four pictures of a comparison may take in one row
 
 SCENES = f"""Scenes:
@@ -47,9 +49,10 @@ SCENES = f"""Scenes:
 
 FILES = """Files:
   --size is that of the frame; of each sphere in a grid. A render of more than ten seconds keeps what it has reached in
-  OUTPUT.part: killed and started again, the same command goes on, and the result is the same. With --against, beside
-  OUTPUT.png: OUTPUT.reference.png, and OUTPUT.against.png with reference, result, signed difference, FLIP and the
-  figures; beside OUTPUT.exr: OUTPUT.reference.exr and OUTPUT.difference.exr, result minus reference, linear."""
+  OUTPUT.sommerl-part: killed and started again, the same command goes on, and the result is the same. With --against,
+  beside OUTPUT.png: OUTPUT.reference.png, and OUTPUT.against.png with reference, result, signed difference, FLIP and
+  the figures; beside OUTPUT.exr: OUTPUT.reference.exr and OUTPUT.difference.exr, result minus reference, linear. In a
+  grid, figures are of the spheres that have a reference."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,10 @@ class Materials:
         brdf = self._load(pair.source)
         lookup = self._lookup if pair.given else None
         if pair.against is not None:
-            return alike(self._load(pair.against), brdf, lookup)
+            reference = self._load(pair.against)
+            if self._lookup and not pair.given:
+                return interpolated(reference, self._lookup), brdf
+            return alike(reference, brdf, lookup)
         brdf = interpolated(brdf, lookup) if lookup else brdf
         return brdf, brdf
 
@@ -107,11 +113,12 @@ def render(options: Namespace) -> dict[str, Any]:
         identity["environment"] = content(setting.environment)
     if setting.mesh:
         identity["mesh"] = content(setting.mesh.positions, setting.mesh.faces, setting.mesh.normals)
-    checkpoint = Checkpoint(options.output.with_name(f"{options.output.name}.part"), identity, warn)
+    checkpoint = Checkpoint(checkpoint_of(options.output), identity, warn)
     started = time.perf_counter()
     candidates, references = _rendered(options, pairs, materials, setting, checkpoint)
     seconds = time.perf_counter() - started
-    exposed_as = _sheet(references or candidates)
+    comparison = _compared(options, pairs, references, candidates) if references else None
+    exposed_as = comparison.reference if comparison else _sheet(candidates)
     scale = exposure(exposed_as.pixels, exposed_as.mask)
     caption = pairs if options.scene == GRID else []
     _write(options.output, candidates, scale, caption)
@@ -119,16 +126,18 @@ def render(options: Namespace) -> dict[str, Any]:
     result |= {"variant": mitsuba().variant(), "scene": options.scene, "sampler": options.sampler}
     result |= {"material": labels[0][1], "materials": [name for _, name in labels], "resumed": checkpoint.resumed}
     rows: dict[str, str] = {}
-    if references:
-        comparison = Comparison.of(exposed_as, _sheet(candidates))
+    if comparison:
         _write(outputs["reference"], references, scale, caption)
         names = _held_against(pairs, labels)
         _write_against(outputs, comparison, names)
-        tables = table_distance(*materials.both(pairs[0]))
-        result |= asdict(comparison.metrics) | {f"table_{name}": value for name, value in tables.items()}
-        result |= {"reference": names[0], "candidate": names[1]}
+        result |= asdict(comparison.metrics) | {"reference": names[0], "candidate": names[1]}
         result |= {f"{name}_image": str(path) for name, path in outputs.items()}
-        rows = image_rows(comparison.metrics) | table_rows(tables)
+        rows = image_rows(comparison.metrics)
+        held = [pair for pair in pairs if pair.against is not None]
+        if len(held) == 1:  # those of several materials would be no figure of any
+            tables = table_distance(*materials.both(held[0]))
+            result |= {f"table_{name}": value for name, value in tables.items()}
+            rows |= table_rows(tables)
     checkpoint.remove()
     if not options.json:
         shown = ", ".join(result["materials"][:3]) + (f" and {len(labels) - 3} more" if labels[3:] else "")
@@ -140,9 +149,11 @@ def render(options: Namespace) -> dict[str, Any]:
 
 def _outputs(options: Namespace) -> dict[str, Path]:
     """The files of a comparison, by what they show."""
-    inputs = [*options.materials, *options.against, *(str(path) for path in (options.envmap, options.mesh) if path)]
-    for source in inputs or [""]:
-        check_output(options.output, (".png", ".exr"), source)
+    inputs = [*options.materials, *options.against, options.envmap, options.mesh]
+    if options.scene == GRID:
+        inputs += [file for source in options.materials for file in _files(source)]
+    check_output(options.output, (".png", ".exr"), *inputs)
+    check_apart(checkpoint_of(options.output), *inputs)
     if not options.against:
         return {}
     second = "against" if options.output.suffix.lower() == ".png" else "difference"
@@ -150,7 +161,7 @@ def _outputs(options: Namespace) -> dict[str, Path]:
         name: options.output.with_suffix(f".{name}{options.output.suffix.lower()}") for name in ("reference", second)
     }
     for path in paths.values():
-        check_output(path, (".png", ".exr"))
+        check_output(path, (".png", ".exr"), *inputs)
     return paths
 
 
@@ -162,10 +173,10 @@ def _pairs(options: Namespace) -> list[Pair]:
     else:
         own = STAGES[options.scene].materials
         if len(given) > len(own):
-            raise OptionError(f"{options.scene}: expected at most {len(own)} materials, found {len(given)}")
+            raise OptionError(f"materials: expected at most {len(own)} in {options.scene}, found {len(given)}")
         sources = given + list(own[len(given) :])
     if len(options.against) > len(sources):
-        raise OptionError(f"against: expected at most {len(sources)} references, found {len(options.against)}")
+        raise OptionError(f"against: expected at most {len(sources)}, found {len(options.against)}")
     against = options.against + [None] * (len(sources) - len(options.against))
     return [
         Pair(source, reference, options.scene == GRID or number < len(given))
@@ -212,8 +223,9 @@ def _looked_at(
             identity[f"reference {len(kept)}"] = content_of(reference)
     if not kept:
         raise MaterialError(f"{options.materials[0]}: expected a folder with materials, found none that can be read")
-    if len(kept) * options.size**2 > MOST_PIXELS:
-        most = int((MOST_PIXELS / len(kept)) ** 0.5)
+    pixels = MOST_COMPARED if options.against else MOST_PIXELS
+    if len(kept) * options.size**2 > pixels:
+        most = int((pixels / len(kept)) ** 0.5)
         raise OptionError(f"size: expected at most {most} for {len(kept)} materials, found {options.size}")
     return kept, identity, labels
 
@@ -239,10 +251,13 @@ def _rendered(
     name = "sphere" if options.scene == GRID else options.scene
     frames = [[pair] for pair in pairs] if options.scene == GRID else [pairs]
 
+    @lru_cache(maxsize=len(pairs) if len(frames) == 1 else 1)
+    def fitted(pair: Pair) -> Sampler:
+        return named.fitted(options.sampler, materials.both(pair)[0])
+
     def make(frame: Sequence[Pair], which: int) -> Scene:
-        both = [materials.both(pair) for pair in frame]
-        samplers = [named.fitted(options.sampler, reference) for reference, _ in both]
-        brdfs = [pair[which] for pair in both]
+        samplers = [fitted(pair) for pair in frame]
+        brdfs = [materials.both(pair)[which] for pair in frame]
         return stage(
             name, brdfs, samplers=samplers, environment=setting.environment, mesh=setting.mesh, size=options.size
         )
@@ -255,7 +270,7 @@ def _rendered(
         with console.progress("rendering") as advance:
             images = render_all(makers, spp=options.spp, seed=options.seed, progress=advance, checkpoint=checkpoint)
     except KeyboardInterrupt:
-        if checkpoint.path.exists():
+        if checkpoint.holds:
             print(f"{checkpoint.path}: from here, the same command goes on", file=sys.stderr)
         raise
     rest = iter(images)
@@ -267,20 +282,33 @@ def _rendered(
     return candidates, references if any(compared) else []
 
 
+def _compared(
+    options: Namespace, pairs: Sequence[Pair], references: Sequence[Image], candidates: Sequence[Image]
+) -> Comparison:
+    """The images of a scene, or those spheres of a grid that have a reference, each without empty places."""
+    both = list(zip(references, candidates, strict=True))
+    if options.scene == GRID:
+        both = [images for images, pair in zip(both, pairs, strict=True) if pair.against is not None]
+    with console.progress("comparing"):
+        a, b = ([images[which] for images in both] for which in (0, 1))
+        measured = Comparison.of(_sheet(a, 1), _sheet(b, 1))
+    return replace(measured, reference=_sheet(a), candidate=_sheet(b))
+
+
 def _held_against(pairs: Sequence[Pair], labels: Sequence[tuple[str, str]]) -> tuple[str, str]:
     """What the references are called, and what is held against them."""
     found = [names for pair, names in zip(pairs, labels, strict=True) if pair.against is not None]
     return ", ".join(reference for reference, _ in found), ", ".join(name for _, name in found)
 
 
-def _sheet(images: Sequence[Image]) -> Image:
+def _sheet(images: Sequence[Image], columns: int = 0) -> Image:
     """One image of several, in rows, linear."""
-    columns = _columns(len(images))
+    columns = columns or _columns(len(images))
     return Image(tiled([image.pixels for image in images], columns), tiled([image.mask for image in images], columns))
 
 
 def _columns(count: int) -> int:
-    """Of a sheet: at least as wide as high, at most four times, and with the fewest empty places."""
+    """Of a sheet: at least as many as rows, and with the fewest empty places among those less than twice the root."""
     least = math.ceil(math.sqrt(count))
     return min(range(least, 2 * least), key=lambda columns: (-count % columns, columns))
 
@@ -309,6 +337,6 @@ def _write_against(outputs: dict[str, Path], comparison: Comparison, names: tupl
         f"difference × {DIFFERENCE_GAIN}, red: brighter": signed_difference(a, b),
         "FLIP, black for none": flip_map(a, b),
     }
-    note = "    ".join(f"{name} {value}" for name, value in image_rows(comparison.metrics).items())
+    notes = [f"{name} {value}" for name, value in image_rows(comparison.metrics).items()]
     columns = len(pictures) if len(pictures) * a.shape[1] <= WIDEST else 2
-    write_image(outputs["against"], captioned(list(pictures.items()), columns, note))
+    write_image(outputs["against"], captioned(list(pictures.items()), columns, notes))

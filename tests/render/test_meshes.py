@@ -1,10 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers import check_sentence, complaint, must_fail
 
 from sommerl.errors import FormatError
 from sommerl.render import scenes
-from sommerl.render.meshes import knot, lathe, load_mesh
+from sommerl.render.meshes import knot, lathe, load_mesh, vertex_normals
 
 MADE = {"finial": scenes.finial, "bowl": scenes.bowl, "vase": scenes.vase, "knot": lambda: knot("knot")}
 TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
@@ -118,7 +120,51 @@ def test_inside_out_is_turned(tmp_path):
     check_closed_and_outward(mesh.positions, mesh.faces, mesh.normals)
 
 
+def test_normals_on_the_wrong_side_are_turned(tmp_path):
+    """Whether it is they or the faces that are on the wrong side."""
+    path = tmp_path / "mesh.obj"
+    for faces, normals, sentence in (
+        (OUTWARD[:, ::-1], NORMALS, "its faces are inside out: they are turned"),
+        (OUTWARD, -NORMALS, "its vertex normals point inwards: they are turned"),
+    ):
+        path.write_text(obj(faces, normals))
+        mesh = load_mesh(path)
+        assert mesh.found == f"{path}: {sentence}"
+        check_is_the_tetrahedron(mesh)
+        check_closed_and_outward(mesh.positions, mesh.faces, mesh.normals)
+
+
+def test_a_seam_of_texture_coordinates_is_smooth():
+    mesh = knot("knot", rows=60, columns=20)
+    n = len(mesh.positions)
+    twice = np.concatenate([mesh.positions, mesh.positions])
+    faces = mesh.faces.copy()
+    faces[::2] += n  # half of the faces have vertices of their own, at the same places
+    found = vertex_normals(twice, faces)
+    assert np.allclose(found[:n], mesh.normals, atol=1e-6)
+    assert np.allclose(found[n:], mesh.normals, atol=1e-6)
+
+
+def test_words_may_be_apart_by_tabs(tmp_path):
+    path = tmp_path / "mesh.obj"
+    path.write_text(obj(OUTWARD, NORMALS).replace("f ", "f\t"))
+    assert load_mesh(path).found == ""
+
+
+def test_wide_and_deep_ones_fit_too():
+    for longest in range(3):
+        scale = np.array([0.3, 0.3, 0.3], np.float32)
+        scale[longest] = 3
+        made = knot("knot")
+        mesh = replace(made, positions=made.positions * scale).standing()
+        size = np.ptp(mesh.positions, axis=0)
+        assert size.max() == pytest.approx(1, abs=1e-5)
+        assert size.argmax() == longest
+        assert mesh.positions[:, 1].min() == pytest.approx(0, abs=1e-6)
+
+
 BROKEN = {
+    "binary.ply": bytes(range(256)) * 9,
     "empty.obj": "",
     "text.obj": "f_r = 0.5\n",
     "no_faces.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\n",
@@ -138,7 +184,8 @@ BROKEN = {
 @pytest.mark.parametrize("name", BROKEN)
 def test_broken_ones_are_refused_by_one_sentence(tmp_path, name):
     path = tmp_path / name
-    path.write_text(BROKEN[name])
+    content = BROKEN[name]
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
     message = complaint(load_mesh, path)
     assert message is not None
     check_sentence(message, str(path))

@@ -7,7 +7,7 @@ from helpers import check_sentence, lambertian_table, must_fail
 from sommerl import builtin
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
 from sommerl.render import checkpoint as checkpoints
-from sommerl.render.checkpoint import Checkpoint, content, content_of
+from sommerl.render.checkpoint import MAGIC, Checkpoint, State, content, content_of
 from sommerl.render.environment import default_environment
 from sommerl.render.passes import _passes, render_all
 from sommerl.render.scenes import sphere
@@ -27,7 +27,7 @@ class Job:
         monkeypatch.setattr("sommerl.render.passes.SAMPLES_A_PASS", SIZE * SIZE * 16)
         monkeypatch.setattr(checkpoints, "SECONDS", 0.0)
         monkeypatch.setattr(checkpoints, "SHARE", 0)
-        self.path, self.said, self.steps = folder / "out.png.part", [], []
+        self.path, self.said, self.steps = folder / "out.png.sommerl-part", [], []
 
     def __call__(self, stop=0, material="1", resume=True, **options):
         kept = Checkpoint(self.path, {"material": material}, self.said.append) if resume else None
@@ -100,7 +100,8 @@ def broken(data):
 def test_a_broken_checkpoint_is_ignored_and_named(job, number):
     with pytest.raises(Stopped):
         job(3)
-    job.path.write_bytes(broken(job.path.read_bytes())[number])
+    whole = job.path.read_bytes()
+    job.path.write_bytes(MAGIC + broken(whole[len(MAGIC) :])[number])
     pixels, kept = job()
     assert not kept.resumed
     (sentence,) = job.said
@@ -145,3 +146,16 @@ def test_an_empty_state_is_not_worth_a_file(job):
     with pytest.raises(Stopped):
         render_all([fail], checkpoint=Checkpoint(job.path, {}, print))
     assert not job.path.exists()
+
+
+def test_writing_takes_a_small_share_of_the_time(tmp_path, monkeypatch):
+    monkeypatch.setattr(checkpoints, "SECONDS", 0.0)
+    kept = Checkpoint(tmp_path / "x", {}, print)
+    state = State((), np.zeros((512, 512, 3)), 1)
+    kept.save(state)
+    kept.path.unlink()
+    kept.save(state)
+    assert not kept.path.exists()
+    monkeypatch.setattr(checkpoints, "SHARE", 0)
+    kept.save(state)
+    assert kept.path.exists()

@@ -11,6 +11,7 @@ from sommerl.render.llvm import mitsuba
 from sommerl.render.meshes import knot
 from sommerl.render.passes import render
 from sommerl.render.scenes import STAGES, stage
+from sommerl.sampling.cosine import CosineSampler
 
 mi = mitsuba()
 
@@ -92,3 +93,34 @@ def test_scenes_refuse_what_they_do_not_take():
         stage("still-life", materials("still-life"), environment=default_environment(16))
     with pytest.raises(OptionError, match="sphere: expected no mesh"):
         stage("sphere", materials("sphere"), mesh=knot("knot"))
+    with pytest.raises(OptionError, match="scene: expected sphere, statue, still-life, found grid"):
+        stage("grid", [])
+
+
+@pytest.mark.parametrize("name", STAGES)
+def test_samplers_are_the_ones_that_are_given(name):
+    """Cosine sampling is the same for all materials, and other than the default."""
+    brdfs = materials(name)
+    one, other = (
+        render(stage(name, brdfs, samplers=[CosineSampler.fitted(brdf) for brdf in fitted_to], size=24), spp=4).pixels
+        for fitted_to in (brdfs, brdfs[::-1])
+    )
+    assert np.array_equal(one, other)
+    assert not np.array_equal(one, render(stage(name, brdfs, size=24), spp=4).pixels)
+
+
+def check_as_bright(name, albedo):
+    """As Mitsuba's own diffuse material, whose code has nothing in common with ours."""
+    own = mi.load_dict({"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.5}})
+    images = [
+        render(stage(name, [brdf] * len(STAGES[name].materials), size=48), spp=256)
+        for brdf in (lambertian_table(albedo), own)
+    ]
+    a, b = (image.pixels[image.mask].mean() for image in images)
+    assert a == pytest.approx(b, rel=5e-3)
+
+
+@pytest.mark.parametrize("name", STAGES)
+def test_a_lambertian_is_mitsubas_diffuse(name):
+    check_as_bright(name, 0.5)
+    must_fail(check_as_bright, name, 0.51)

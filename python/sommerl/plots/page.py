@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Generator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +12,7 @@ from ..brdf import Brdf
 from ..errors import MaterialError, OptionError
 from ..files import atomic_write
 from ..optional import optional
+from ..style import plain_style
 
 Material = tuple[str, Brdf]  #: and its name
 Materials = Brdf | Mapping[str, Brdf]  #: a material, or several by the names that a legend gives them
@@ -34,17 +33,6 @@ MOST_MATERIALS = len(STYLES)
 def matplotlib(module: str = "matplotlib.figure") -> Any:
     """A module of matplotlib. Raises MissingDependencyError without it."""
     return optional(module, "matplotlib", "plots", "formats")
-
-
-@contextmanager
-def plain_style() -> Generator[None]:
-    """Matplotlib as it comes, whatever the user's settings: same input, same picture."""
-    library = matplotlib("matplotlib")
-    with library.rc_context(), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing")  # names may be in any script
-        library.rcdefaults()
-        library.rcParams["svg.hashsalt"] = "sommerl"  # else the names inside an SVG file are random
-        yield
 
 
 def save(figure: Any, path: Path) -> None:

@@ -10,10 +10,11 @@ from ..brdf import Brdf, OnLattice
 from ..errors import OptionError
 from ..lattice import Lattice
 from ..som_man.material import SomManBrdf
+from ..style import plain_style
 from .curves import lobes, theta_h_slices
 from .image_slice import slices
 from .lattice_hits import hits
-from .page import Material, Materials, matplotlib, named, plain_style, text
+from .page import Material, Materials, matplotlib, named, text
 from .palettes import palette, usage
 from .tone import Tone
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..optional import optional
 from ..render.compare import Comparison
+from ..style import plain_style
 from .page import save
 
 COLUMNS = 6  # of a sheet of spheres
@@ -18,19 +19,20 @@ def fits(name: str, models: Sequence[str], comparisons: Sequence[Comparison], pa
 
     comparisons: of `compare_on_sphere`, one a model. Raises MissingDependencyError without matplotlib.
     """
-    figures = optional("matplotlib.figure", "matplotlib", "plots", "fit")
-    cells = [(name, [comparisons[0].pictures()[0]])]
-    for model, comparison in zip(models, comparisons, strict=True):
-        cells.append((f"{model}: {comparison.metrics.psnr_object_db:.1f} dB", comparison.pictures()[1:]))
-    columns = min(COLUMNS, len(cells))
-    lines = -(-len(cells) // columns)
-    figure = figures.Figure(figsize=(2.2 * columns, 4.7 * lines), layout="constrained")
-    axes = figure.subplots(2 * lines, columns, squeeze=False)
-    for ax in axes.flat:
-        ax.axis("off")
-    for number, (title, pictures) in enumerate(cells):
-        line, column = divmod(number, columns)
-        axes[2 * line, column].set_title(title, fontsize=8, wrap=True)
-        for below, pixels in enumerate(pictures):
-            axes[2 * line + below, column].imshow(pixels)
-    save(figure, path)
+    with plain_style():
+        figures = optional("matplotlib.figure", "matplotlib", "plots", "fit")
+        cells = [(name, [comparisons[0].pictures()[0]])]
+        for model, comparison in zip(models, comparisons, strict=True):
+            cells.append((f"{model}: {comparison.metrics.psnr_object_db:.1f} dB", comparison.pictures()[1:]))
+        columns = min(COLUMNS, len(cells))
+        lines = -(-len(cells) // columns)
+        figure = figures.Figure(figsize=(2.2 * columns, 4.7 * lines), layout="constrained")
+        axes = figure.subplots(2 * lines, columns, squeeze=False)
+        for ax in axes.flat:
+            ax.axis("off")
+        for number, (title, pictures) in enumerate(cells):
+            line, column = divmod(number, columns)
+            axes[2 * line, column].set_title(title, fontsize=8, wrap=True)
+            for below, pixels in enumerate(pictures):
+                axes[2 * line + below, column].imshow(pixels)
+        save(figure, path)

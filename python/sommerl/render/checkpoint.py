@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import time
 import zipfile
@@ -15,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..brdf import Brdf
+from ..errors import OptionError
 from ..files import atomic_write
 
+MAGIC = b"SMRLPART"  # how a checkpoint begins; an archive of NumPy's follows
 SECONDS = 10.0  # of rendering that a kill may cost; what is done sooner is never written
 SHARE = 20  # … and at least that many times as long as writing takes
 PROBES = 1024  # pairs of directions at which a material is looked at
@@ -42,18 +45,23 @@ class State:
 class Checkpoint:
     """A file that holds a state, and of which render.
 
-    path: OUTPUT.part as a rule. identity: everything that decides the pixels, by a name that a person understands;
+    path: see `checkpoint_of`. identity: everything that decides the pixels, by a name that a person understands;
     whatever else decides them is added by `render_all`. say: is given one sentence if the file that is there does not
-    serve.
+    serve, or none can be written.
     """
 
     path: Path
     resumed: bool  #: whether the render went on from a state that was loaded
+    holds: bool  #: whether the file holds a state of this render
 
     def __init__(self, path: Path, identity: Mapping[str, str], say: Callable[[str], None]) -> None:
+        """Raises OptionError if something else has that name: it is not to be written over."""
         self.path, self._identity, self._say = path, dict(identity), say
-        self.resumed = False
+        self.resumed = self.holds = False
         self._last, self._cost = time.monotonic(), 0.0
+        self._writable = True
+        if path.exists() and not (path.is_file() and _starts_with_magic(path)):
+            raise OptionError(f"{path}: expected a checkpoint or nothing, found something else, which is kept")
 
     def load(self, identity: Mapping[str, str]) -> State:
         """The state to go on from: an empty one if there is no file, or not one of the same render."""
@@ -62,8 +70,7 @@ class Checkpoint:
         if not self.path.exists():
             return State()
         try:
-            # Opened here, since NumPy leaves a file open that turns out to be broken.
-            with self.path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+            with np.load(io.BytesIO(self.path.read_bytes()[len(MAGIC) :]), allow_pickle=False) as file:
                 found = json.loads(str(file["identity"]))
                 other = [key for key in self._identity | found if self._identity.get(key) != found.get(key)]
                 if other:
@@ -75,16 +82,16 @@ class Checkpoint:
         except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile):
             self._say(f"{self.path}: expected a checkpoint, found a broken one; the render starts anew")
             return State()
-        self.resumed = True
+        self.resumed = self.holds = True
         return state
 
     def save(self, state: State, *, now: bool = False) -> None:
         """Writes the state, if enough time has passed to make that worth its cost, or `now`.
 
-        Raises OSError if it cannot be written.
+        If it cannot, says so once: that is no reason to stop rendering.
         """
         started = time.monotonic()
-        if not now and started - self._last < max(SECONDS, SHARE * self._cost):
+        if not self._writable or (not now and started - self._last < max(SECONDS, SHARE * self._cost)):
             return
         images = state.images
         arrays: dict[str, Any] = {
@@ -94,14 +101,31 @@ class Checkpoint:
             "total": np.zeros(0) if state.total is None else state.total,
             "passes": state.passes,
         }
-        with atomic_write(self.path) as out:
-            np.savez(out, **arrays)
+        try:
+            with atomic_write(self.path) as out:
+                out.write(MAGIC)
+                np.savez(out, **arrays)
+            self.holds = True
+        except OSError as error:
+            self._writable = False
+            self._say(f"{self.path}: {error.strerror}; the render goes on, but could not be resumed from here")
         self._last = time.monotonic()
         self._cost = self._last - started
 
     def remove(self) -> None:
-        """The render is finished and written: nothing is left to go on from."""
-        self.path.unlink(missing_ok=True)
+        """The render is finished and written: nothing is left to go on from, nor an older state."""
+        if self.path.is_file() and _starts_with_magic(self.path):
+            self.path.unlink()
+
+
+def checkpoint_of(output: Path) -> Path:
+    """Where the checkpoint of an image is kept."""
+    return output.with_name(f"{output.name}.sommerl-part")
+
+
+def _starts_with_magic(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(MAGIC)) == MAGIC
 
 
 def content(*arrays: NDArray[Any]) -> str:

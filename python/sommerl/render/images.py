@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..files import atomic_write
 from ..optional import optional
+from ..style import plain_style
 from .llvm import mitsuba
 
 DIFFERENCE_GAIN = 8
@@ -65,38 +66,57 @@ def tiled(pictures: Sequence[NDArray[Any]], columns: int) -> NDArray[Any]:
     return sheet.reshape(rows * height, columns * width, *rest)
 
 
-def captioned(pictures: Sequence[tuple[str, NDArray[np.uint8]]], columns: int, note: str = "") -> NDArray[np.uint8]:
-    """Pictures of one size in rows, pixel for pixel, on white, each with a caption below, and a note below all.
+def captioned(
+    pictures: Sequence[tuple[str, NDArray[np.uint8]]], columns: int, notes: Sequence[str] = ()
+) -> NDArray[np.uint8]:
+    """Pictures of one size in rows, pixel for pixel, on white, each with a caption below, and notes below all.
 
     Raises MissingDependencyError without matplotlib.
     """
-    figures = optional("matplotlib.figure", "matplotlib", "labels", "render")
-    agg = optional("matplotlib.backends.backend_agg", "matplotlib", "labels", "render")
     height, width = pictures[0][1].shape[:2]
     text = max(9, width // 22)  # the height of letters, in pixels
     band = 2 * text
     step = height + band
     rows = -(-len(pictures) // columns)
-    whole = columns * width, rows * step + (band if note else 0)
-    sheet = np.full((whole[1], whole[0], 3), 255, np.uint8)
-    figure = figures.Figure(figsize=((whole[0] + 0.5) / 100, (whole[1] + 0.5) / 100), dpi=100)
-    canvas = agg.FigureCanvasAgg(figure)
-
-    def write(x: float, y: float, words: str, room: int) -> None:
-        # No mathematics: a dollar or an underscore in a name is one.
-        x, y = x / whole[0], 1 - y / whole[1]
-        size = min(text, 1.7 * room / len(words))  # letters are about half as wide as high
-        figure.text(x, y, words, fontsize=0.72 * size, ha="center", va="center", parse_math=False)
-
+    wide = columns * width
+    lines = _lines(notes, int(1.5 * wide / text))
+    sheet = np.full((rows * step + band * len(lines), wide, 3), 255, np.uint8)
+    words: list[tuple[float, float, str, int]] = []
     for number, (caption, picture) in enumerate(pictures):
         x, y = number % columns * width, number // columns * step
         sheet[y : y + height, x : x + width] = picture
-        write(x + width / 2, y + height + band / 2, shortened(caption, int(1.9 * width / text)), width)
-    if note:
-        write(whole[0] / 2, whole[1] - band / 2, note, whole[0])
-    canvas.draw()
-    drawn = np.asarray(canvas.buffer_rgba())[: whole[1], : whole[0], :3]
-    return np.minimum(drawn, sheet)  # letters are darker than the bands that they stand on
+        words.append((x + width / 2, y + height + band / 2, shortened(caption, int(1.5 * width / text)), width))
+    for number, line in enumerate(lines):
+        words.append((wide / 2, rows * step + (number + 0.5) * band, line, wide))
+    return np.minimum(_lettered(sheet.shape[:2], words, text), sheet)  # letters are darker than what they stand on
+
+
+def _lines(notes: Sequence[str], most: int) -> list[str]:
+    """Notes in lines of at most so many letters; one that is longer has its own."""
+    lines: list[str] = []
+    for note in notes:
+        together = f"{lines[-1]}    {note}" if lines else note
+        if lines and len(together) <= most:
+            lines[-1] = together
+        else:
+            lines.append(note)
+    return lines
+
+
+def _lettered(shape: tuple[int, ...], words: Sequence[tuple[float, float, str, int]], height: int) -> NDArray[np.uint8]:
+    """Words on white: where their middle is, what they are, and how many pixels they may take."""
+    figures = optional("matplotlib.figure", "matplotlib", "labels", "render")
+    agg = optional("matplotlib.backends.backend_agg", "matplotlib", "labels", "render")
+    with plain_style():
+        figure = figures.Figure(figsize=((shape[1] + 0.5) / 100, (shape[0] + 0.5) / 100), dpi=100)
+        canvas = agg.FigureCanvasAgg(figure)
+        for x, y, word, room in words:
+            size = min(height, 1.5 * room / max(len(word), 1))  # letters are about two thirds as wide as high
+            # No mathematics: a dollar or an underscore in a name is one.
+            place = x / shape[1], 1 - y / shape[0]
+            figure.text(*place, word, fontsize=0.72 * size, ha="center", va="center", parse_math=False)
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[: shape[0], : shape[1], :3]
 
 
 def shortened(text: str, most: int) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 
 from .. import jit
 from ..errors import MissingDependencyError
+from ..interrupt import undisturbed
 
 
 def mitsuba() -> Any:
@@ -20,7 +21,11 @@ def mitsuba() -> Any:
     """
     mi = _module()
     if mi.variant() is None:
-        mi.set_variant(_variant(mi))
+        with undisturbed():
+            mi.set_variant(_variant(mi))
+            dr = jit.drjit()
+            if dr.thread_count() < 2:
+                dr.set_thread_count(2)  # with one, Mitsuba waits for ever when it reads or writes OpenEXR files
     if not mi.variant().endswith("rgb"):
         raise MissingDependencyError(f"Mitsuba's variant: expected one of RGB, like llvm_ad_rgb, found {mi.variant()}")
     return mi
@@ -31,7 +36,8 @@ def _module() -> Any:
     if importlib.util.find_spec("mitsuba") is None:
         raise MissingDependencyError("rendering needs Mitsuba: install sommerl[render]")
     jit.choose_llvm()
-    return importlib.import_module("mitsuba")
+    with undisturbed():
+        return importlib.import_module("mitsuba")
 
 
 def drjit() -> Any:

@@ -32,11 +32,12 @@ class Mesh:
     normals: NDArray[np.float32]
     found: str = ""
 
-    def standing(self, height: float = 1.0) -> Mesh:
-        """The same mesh, scaled to a height, on the plane y = 0, its bounding box about the y axis."""
+    def standing(self, size: float = 1.0) -> Mesh:
+        """The same mesh on the plane y = 0, its bounding box about the y axis and scaled so that its longest side,
+        which is the height of a statue, is `size`."""
         low, high = self.positions.min(axis=0).astype(float), self.positions.max(axis=0).astype(float)
         foot = (low + high) / 2 * [1, 0, 1] + low * [0, 1, 0]
-        positions = (self.positions - foot) * (height / (high[1] - low[1]))
+        positions = (self.positions - foot) * (size / (high - low).max())
         return replace(self, positions=positions.astype(np.float32))
 
     def turned(self, degrees: float) -> Mesh:
@@ -85,12 +86,17 @@ def load_mesh(path: Path) -> Mesh:
     if not np.ptp(positions[:, 1]) > 0:
         raise FormatError(f"{path}: expected a mesh that has a height along y, found a flat one")
     notes: list[str] = []
-    if normals is None or not (np.abs(normals).max(axis=-1) > SHORTEST).all():  # nor is NaN, which stays NaN
+    computed = normals is None or not (np.abs(normals).max(axis=-1) > SHORTEST).all()  # nor is NaN, which stays NaN
+    if normals is None or computed:
         normals = vertex_normals(positions, faces)
         notes.append("it has no vertex normals: they are computed from its faces")
     if _volume(positions, faces) < 0:
-        faces, normals = faces[:, ::-1], -normals
+        faces = faces[:, ::-1]
         notes.append("its faces are inside out: they are turned")
+    if _agreement(positions, faces, normals) < 0:
+        normals = -normals
+        if not computed:
+            notes.append("its vertex normals point inwards: they are turned")
     found = f"{path}: {', and '.join(notes)}" if notes else ""
     return Mesh("mesh", positions, faces, normals, found)
 
@@ -102,7 +108,7 @@ def _read(path: Path, kind: str) -> tuple[NDArray[np.float32], NDArray[np.uint32
     try:
         # Left to itself, Mitsuba computes normals that are missing before anybody has looked at the faces.
         mesh = mi.load_dict({"type": kind, "filename": str(path), "face_normals": not given})
-    except RuntimeError as error:
+    except (RuntimeError, UnicodeDecodeError) as error:  # the latter where Mitsuba's own sentence quotes the file
         raise FormatError(f"{path}: expected a mesh of triangles, found something unreadable") from error
     parameters = mi.traverse(mesh)
     positions = np.array(parameters["vertex_positions"], np.float32).reshape(-1, 3)
@@ -115,22 +121,36 @@ def _has_normals(path: Path, kind: str) -> bool:
     """Whether all faces name normals (OBJ), or all vertices have some (PLY). Others, Mitsuba would leave undefined."""
     with path.open("rb") as file:
         if kind == "obj":
-            corners = [
-                line.split(None, 2)[1] for line in file if line.startswith(b"f ") and len(line.split(None, 2)) > 1
-            ]
+            words = (line.split(None, 2) for line in file)
+            corners = [found[1] for found in words if found[:1] == [b"f"] and len(found) > 1]
             return bool(corners) and all(len(corner.split(b"/")) == 3 for corner in corners)
         return b" nx\n" in file.read(HEADER_BYTES).partition(b"end_header")[0].replace(b"\r", b"")
 
 
 def vertex_normals(positions: NDArray[np.float32], faces: NDArray[np.uint32]) -> NDArray[np.float32]:
-    """Unit normals (n, 3) of vertices: the mean of their faces', by the faces' areas. (0, 1, 0) where there is none."""
-    a, b, c = (positions[faces[:, k]].astype(np.float64) for k in range(3))
-    of_faces = np.cross(b - a, c - a)
-    normals = np.stack(
-        [sum(np.bincount(faces[:, k], of_faces[:, j], len(positions)) for k in range(3)) for j in range(3)], axis=-1
-    )
+    """Unit normals (n, 3) of vertices: the mean of their faces', by the faces' areas. (0, 1, 0) where there is none.
+
+    Vertices at one place, as where texture coordinates have a seam, get the same.
+    """
+    _, place = np.unique(positions, axis=0, return_inverse=True)
+    place = place.reshape(-1)
+    corners, of_faces, count = place[faces], _face_normals(positions, faces), int(place.max()) + 1
+    sums = [sum(np.bincount(corners[:, k], of_faces[:, j], count) for k in range(3)) for j in range(3)]
+    normals = np.stack(sums, axis=-1)[place]
     length = np.linalg.norm(normals, axis=-1, keepdims=True)
     return np.where(length > 0, normals / np.where(length > 0, length, 1), [0.0, 1.0, 0.0]).astype(np.float32)
+
+
+def _face_normals(positions: NDArray[np.float32], faces: NDArray[np.uint32]) -> Floats:
+    """Of each face, twice its area long."""
+    a, b, c = (positions[faces[:, k]].astype(np.float64) for k in range(3))
+    return np.cross(b - a, c - a)
+
+
+def _agreement(positions: NDArray[np.float32], faces: NDArray[np.uint32], normals: NDArray[np.float32]) -> float:
+    """How far normals are on the side that faces are anticlockwise from: negative if most are on the other."""
+    of_corners = normals[faces].astype(np.float64).sum(axis=1)
+    return float((_face_normals(positions, faces) * of_corners).sum())
 
 
 def _volume(positions: NDArray[np.float32], faces: NDArray[np.uint32]) -> float:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import signal
-import threading
-from collections.abc import Callable, Generator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
+from ..interrupt import undisturbed
 from .checkpoint import Checkpoint, Image, State
 from .llvm import drjit, mitsuba
 
@@ -57,7 +55,7 @@ def render_all(
     state = checkpoint.load(identity) if checkpoint else State()
     try:
         for make in scenes[len(state.images) :]:
-            with _undisturbed():
+            with undisturbed():
                 scene = make()
             width, height = (int(n) for n in scene.mitsuba.sensors()[0].film().size())
             passes = _passes(spp, width * height)
@@ -65,16 +63,17 @@ def render_all(
             if progress and state.passes:
                 progress(before + state.passes, of_all)
             for number in range(state.passes, len(passes)):
-                with _undisturbed():
+                with undisturbed():
                     pixels = np.array(mi.render(scene.mitsuba, spp=passes[number], seed=_seed(seed, number)))
-                    total = passes[number] * pixels.astype(np.float64)
-                    state = State(state.images, total if state.total is None else state.total + total, number + 1)
+                # Not reached after an interruption: of the pass that it came in, Mitsuba may have left out a part.
+                total = passes[number] * pixels.astype(np.float64)
+                state = State(state.images, total if state.total is None else state.total + total, number + 1)
                 if checkpoint:
                     checkpoint.save(state)
                 if progress:
                     progress(before + number + 1, of_all)
             assert state.total is not None
-            with _undisturbed():
+            with undisturbed():
                 image = Image((state.total / spp).astype(np.float32), _mask(scene, width, height))
                 state = State((*state.images, image))
     except KeyboardInterrupt:
@@ -82,23 +81,6 @@ def render_all(
             checkpoint.save(state, now=True)
         raise
     return list(state.images)
-
-
-@contextmanager
-def _undisturbed() -> Generator[None]:
-    """Holds an interruption back until the block has ended: Mitsuba would make another error of it, in mid-air."""
-    interrupt = signal.default_int_handler
-    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is not interrupt:
-        yield
-        return
-    came: list[int] = []
-    signal.signal(signal.SIGINT, lambda number, _: came.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, interrupt)
-    if came:
-        raise KeyboardInterrupt
 
 
 def _passes(spp: int, pixels: int) -> list[int]:

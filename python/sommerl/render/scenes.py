@@ -52,7 +52,7 @@ def statue(
     sampler: Sampler | None = None,
     size: int = DEFAULT_SIZE,
 ) -> Scene:
-    """A mesh of the material, scaled to unit height, on a grey plane in an environment: global illumination.
+    """A mesh of the material, scaled to unit size, on a grey plane in an environment: global illumination.
 
     mesh: see `meshes.load_mesh`; a carved finial if None. The others: see `sphere`.
     """
@@ -123,6 +123,8 @@ def stage(
 
     environment, mesh: the scene's own if None. Raises OptionError for what the scene does not take.
     """
+    if name not in STAGES:
+        raise OptionError(f"scene: expected {', '.join(STAGES)}, found {name}")
     taken = STAGES[name]
     if len(brdfs) != len(taken.materials):
         raise OptionError(f"{name}: expected {len(taken.materials)} materials, found {len(brdfs)}")
@@ -163,7 +165,7 @@ def bowl() -> Mesh:
 
 
 def vase() -> Mesh:
-    """A vase with a neck, fluted."""
+    """A vase with a neck."""
     outside = [(0, 0), (0.22, 0), (0.22, 0), (0.22, 0.03), (0.4, 0.25), (0.42, 0.6), (0.16, 0.85), (0.13, 1.0)]
     inside = [(0.24, 1.12), (0.24, 1.12), (0.22, 1.12), (0.11, 1.0), (0.11, 0.8), (0, 0.8)]
     return lathe("vase", outside + inside, rows=260, columns=160)

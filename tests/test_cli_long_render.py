@@ -1,0 +1,190 @@
+"""Long renders by the command `render`: stopped, and going on."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+
+import pytest
+from helpers import run, run_json
+
+from sommerl import console
+from sommerl.interrupt import undisturbed
+from sommerl.render import checkpoint, passes
+from sommerl.render.environment import default_environment
+from sommerl.render.images import write_image
+
+SMALL = ["--size", "24", "--spp", "4"]
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+EAGER = """
+import sys
+from sommerl.render import checkpoint, passes
+checkpoint.SECONDS = 0.0
+passes.SAMPLES_A_PASS = 2**14
+from sommerl.__main__ import main
+sys.exit(main())
+"""
+
+
+SCALAR = """
+import warnings
+warnings.simplefilter("ignore")
+from sommerl.render import llvm
+llvm.jit.has_llvm = lambda dr: False
+"""
+
+
+def start(*arguments, before=""):
+    """The command, which writes its checkpoint after each of many short passes."""
+    return subprocess.Popen(
+        [sys.executable, "-c", before + EAGER, *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # Where tests run in the background, the signal is ignored, and programs that they start would ignore it, too.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+
+
+@pytest.mark.parametrize(
+    ("kind", "before"),
+    [(signal.SIGKILL, ""), (signal.SIGINT, ""), (signal.SIGINT, SCALAR)],
+    ids=["kill", "int", "scalar"],
+)
+def test_killed_and_started_again_it_goes_on_to_the_same_image(tmp_path, kind, before):
+    """Without LLVM, Mitsuba hands over a pass that was interrupted as it is, with a part of its pixels black."""
+    options = "render", "--scene", "statue", "--size", 32, "--spp", 64 if before else 1024, "--json"
+    whole, path = tmp_path / "whole.exr", tmp_path / "out.exr"
+    part = tmp_path / "out.exr.sommerl-part"
+    process = start(*options, "-o", path, before=before)
+    deadline = time.monotonic() + 60
+    while not part.exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    if before:
+        time.sleep(0.15)  # into the next pass
+    process.send_signal(kind)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode != 0
+    assert part.exists()
+    assert not path.exists()
+    assert (f"{part}: from here, the same command goes on" in err) == (kind == signal.SIGINT)
+    again = start(*options, "-o", path, before=before)
+    out, err = again.communicate(timeout=60)
+    assert (again.returncode, err) == (0, "")
+    assert '"resumed": true' in out
+    assert ('"variant": "scalar_rgb"' in out) == bool(before)
+    assert not part.exists()
+    uninterrupted = start(*options, "-o", whole, before=before)
+    out, _ = uninterrupted.communicate(timeout=60)
+    assert '"resumed": false' in out
+    assert path.read_bytes() == whole.read_bytes()
+
+
+def test_a_file_in_the_place_of_a_checkpoint_that_is_none(capsys, tmp_path):
+    part = tmp_path / "x.png.sommerl-part"
+    part.write_bytes(b"something")
+    status, _, err = run(capsys, "render", "nickel", "-o", tmp_path / "x.png", *SMALL)
+    assert status == 2
+    assert err == f"error: {part}: expected a checkpoint or nothing, found something else, which is kept\n"
+    assert part.read_bytes() == b"something"
+    assert not (tmp_path / "x.png").exists()
+    part.unlink()
+    part.mkdir()
+    assert run(capsys, "render", "nickel", "-o", tmp_path / "x.png", *SMALL)[0] == 2
+    part.rmdir()
+    part.write_bytes(b"SMRLPART and nothing more")
+    status, _, err = run(capsys, "render", "nickel", "-o", tmp_path / "x.png", *SMALL)
+    assert status == 0
+    assert err == f"warning: {part}: expected a checkpoint, found a broken one; the render starts anew\n"
+    assert not part.exists()
+
+
+CHANGES = {
+    "size": ["--size", "25"],
+    "seed": ["--seed", "1"],
+    "spp": ["--spp", "65"],
+    "sampler": ["--sampler", "cosine"],
+    "environment": ["--envmap", "{}/light.exr"],
+    "mesh": ["--mesh", "{}/mesh.obj"],
+    "material 1": ["nickel"],
+    "reference 1": ["--against", "nickel"],
+    "scene": ["--scene", "sphere"],
+}
+
+
+@contextmanager
+def interrupting(what):
+    def advance(done, total):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    yield advance
+
+
+@pytest.mark.parametrize("what", CHANGES)
+def test_whatever_decides_the_pixels_makes_it_another_render(capsys, tmp_path, monkeypatch, what):
+    monkeypatch.setattr(checkpoint, "SECONDS", 0.0)
+    monkeypatch.setattr(passes, "SAMPLES_A_PASS", 2**13)
+    write_image(tmp_path / "light.exr", default_environment(16))
+    (tmp_path / "mesh.obj").write_text(TRIANGLE)
+    usual = ["--scene", "statue", "chrome", "--size", "24", "--spp", "64", "--seed", "0", "-o", f"{tmp_path}/x.exr"]
+    with monkeypatch.context() as patch:
+        patch.setattr(console, "progress", interrupting)
+        with pytest.raises(KeyboardInterrupt):
+            run(capsys, "render", *usual)
+    change = [each.format(tmp_path) for each in CHANGES[what]]
+    given = [each for each in usual if each != "chrome"] if what == "material 1" else usual
+    status, _, err = run(capsys, "render", *given, *change)
+    assert status == 0
+    assert f"expected the same render, found another {what}; it starts anew\n" in err
+
+
+def test_an_interruption_waits_for_the_end_of_the_block():
+    """And is not lost, if the block makes another error of it."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    reached = []
+    for error in (False, True):
+        with pytest.raises(KeyboardInterrupt), undisturbed():  # noqa: PT012
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.01)
+            reached.append(error)
+            if error:
+                raise RuntimeError
+    assert reached == [False, True]
+    with pytest.raises(RuntimeError), undisturbed():
+        raise RuntimeError
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_checkpoint_that_cannot_be_written_stops_nothing(capsys, tmp_path, monkeypatch):
+    def full(path):
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.setattr(checkpoint, "SECONDS", 0.0)
+    monkeypatch.setattr(passes, "SAMPLES_A_PASS", 2**10)
+    monkeypatch.setattr(checkpoint, "atomic_write", full)
+    status, _, err = run(capsys, "render", "nickel", "-o", tmp_path / "x.png", *SMALL)
+    assert status == 0
+    assert err.count("\n") == 1
+    assert "No space left on device; the render goes on" in err
+    assert (tmp_path / "x.png").exists()
+
+
+ONE_CPU = """
+import os, sys
+os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+from sommerl.__main__ import main
+sys.exit(main())
+"""
+
+
+def test_one_processor_will_do(capsys, tmp_path):
+    """Mitsuba's readers and writers of OpenEXR wait for a second thread."""
+    write_image(tmp_path / "light.exr", default_environment(16))
+    options = "render", "nickel", "--envmap", tmp_path / "light.exr", *SMALL
+    done = subprocess.run([sys.executable, "-c", ONE_CPU, *map(str, options), "-o", tmp_path / "x.exr"], timeout=120)
+    assert done.returncode == 0
+    run_json(capsys, *options, "-o", tmp_path / "y.exr")
+    assert (tmp_path / "x.exr").read_bytes() == (tmp_path / "y.exr").read_bytes()
