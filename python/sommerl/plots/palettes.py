@@ -33,6 +33,7 @@ def palette(ax: Any, material: Brdf) -> None:
     pixels[shown, :3] = tone.srgb8(f_r[shown])
     pixels[..., 3] = np.where(shown, 255, 0)
     ax.imshow(pixels, aspect="auto", interpolation="nearest")
+    ax.set_facecolor("0.6")  # or white products would look like unused ones
     ax.set(xticks=[], yticks=[])
     if compressed.grid is None:
         ax.set(xlabel=f"{len(compressed.lut)} shapes", ylabel=f"{len(compressed.gains)} gains")
