@@ -178,7 +178,7 @@ def test_sheets_keep_every_pixel_and_stay_in_order():
     sheet = tiled(pictures, 2)
     assert sheet.shape == (80, 100, 3)
     assert [sheet[y, x, 0] for y, x in ((0, 0), (0, 50), (40, 0), (40, 50))] == [10, 20, 30, 0]
-    labelled = captioned([("one", pictures[0]), ("$two_", pictures[1]), ("ΔE", pictures[2])], 2, "a note")
+    labelled = captioned([("one", pictures[0]), ("$two_", pictures[1]), ("ΔE", pictures[2])], 2, ["a note"])
     band = (labelled.shape[0] - 80) // 3
     assert (labelled[:40, :50] == 10).all()
     assert (labelled[40 + band : 80 + band, :50] == 30).all()
@@ -186,6 +186,22 @@ def test_sheets_keep_every_pixel_and_stay_in_order():
     for rows, columns in ((slice(40, 40 + band), slice(50)), (slice(-band, None), slice(None))):
         letters = labelled[rows, columns]
         assert letters.min() < 100 < 200 < np.median(letters)
+
+
+def test_notes_are_never_cut_off():
+    """They go on in another line; one that is too long for a line gets smaller letters."""
+    picture = [("", np.zeros((40, 100, 3), np.uint8))]
+
+    def sheet(*notes):
+        return captioned(picture, 1, notes)
+
+    band = sheet("a").shape[0] - sheet().shape[0]
+    assert sheet("a", "b").shape == sheet("a").shape
+    assert sheet("a" * 12, "b" * 12).shape[0] == sheet("a").shape[0] + band
+    long_ = sheet("W" * 40)
+    assert long_.shape == sheet("a").shape
+    assert (long_[-band:, [0, -1]] == 255).all()
+    assert long_[-band:].min() < 200
 
 
 def test_long_captions_lose_their_middle():

@@ -111,10 +111,12 @@ def _lettered(shape: tuple[int, ...], words: Sequence[tuple[float, float, str, i
         figure = figures.Figure(figsize=((shape[1] + 0.5) / 100, (shape[0] + 0.5) / 100), dpi=100)
         canvas = agg.FigureCanvasAgg(figure)
         for x, y, word, room in words:
-            size = min(height, 1.5 * room / max(len(word), 1))  # letters are about two thirds as wide as high
             # No mathematics: a dollar or an underscore in a name is one.
             place = x / shape[1], 1 - y / shape[0]
-            figure.text(*place, word, fontsize=0.72 * size, ha="center", va="center", parse_math=False)
+            drawn = figure.text(*place, word, fontsize=0.72 * height, ha="center", va="center", parse_math=False)
+            taken = drawn.get_window_extent(canvas.get_renderer()).width
+            if taken > room - 2:
+                drawn.set_fontsize(0.72 * height * (room - 2) / taken)
         canvas.draw()
         return np.asarray(canvas.buffer_rgba())[: shape[0], : shape[1], :3]
 
