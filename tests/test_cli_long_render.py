@@ -138,7 +138,7 @@ def test_whatever_decides_the_pixels_makes_it_another_render(capsys, tmp_path, m
     given = [each for each in usual if each != "chrome"] if what == "material 1" else usual
     status, _, err = run(capsys, "render", *given, *change)
     assert status == 0
-    assert f"expected the same render, found another {what}; it starts anew\n" in err
+    assert f"expected the same render, found another {what}; this one starts anew" in err
 
 
 def test_an_interruption_waits_for_the_end_of_the_block():

@@ -86,8 +86,28 @@ def test_another_render_starts_anew_and_says_so(job, options, what):
         job(3)
     pixels, kept = job(**options)
     assert not kept.resumed
-    assert job.said == [f"{job.path}: expected the same render, found another {what}; it starts anew"]
+    anew = "this one starts anew, and replaces it after 0 s"
+    assert job.said == [f"{job.path}: expected the same render, found another {what}; {anew}"]
     assert np.array_equal(pixels, job(resume=False, **options)[0])
+    kept.remove()
+    assert not job.path.exists()
+
+
+@pytest.mark.parametrize("stop", [0, 2])
+def test_a_short_render_leaves_the_state_of_another(job, monkeypatch, stop):
+    with pytest.raises(Stopped):
+        job(3)
+    before = job.path.read_bytes()
+    monkeypatch.setattr(checkpoints, "SECONDS", 600.0)
+    if stop:
+        with pytest.raises(Stopped):
+            job(stop, seed=2)
+    else:
+        job(seed=2)[1].remove()
+    assert job.path.read_bytes() == before
+    job.said.clear()
+    assert job()[1].resumed
+    assert job.said == []
 
 
 def broken(data):

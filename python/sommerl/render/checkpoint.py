@@ -58,6 +58,7 @@ class Checkpoint:
         """Raises OptionError if something else has that name: it is not to be written over."""
         self.path, self._identity, self._say = path, dict(identity), say
         self.resumed = self.holds = False
+        self._holds_another = False
         self._last, self._cost = time.monotonic(), 0.0
         self._writable = True
         if path.exists() and not (path.is_file() and _starts_with_magic(path)):
@@ -74,7 +75,9 @@ class Checkpoint:
                 found = json.loads(str(file["identity"]))
                 other = [key for key in self._identity | found if self._identity.get(key) != found.get(key)]
                 if other:
-                    self._say(f"{self.path}: expected the same render, found another {other[0]}; it starts anew")
+                    self._holds_another = True
+                    sentence = f"expected the same render, found another {other[0]}"
+                    self._say(f"{self.path}: {sentence}; this one starts anew, and replaces it after {SECONDS:.0f} s")
                     return State()
                 images = tuple(map(Image, file["pixels"], file["masks"]))
                 passes = int(file["passes"])
@@ -88,9 +91,11 @@ class Checkpoint:
     def save(self, state: State, *, now: bool = False) -> None:
         """Writes the state, if enough time has passed to make that worth its cost, or `now`.
 
-        If it cannot, says so once: that is no reason to stop rendering.
+        If it cannot, says so once: that is no reason to stop rendering. What another render has reached is not given up
+        for less than SECONDS of this one, whose options may be mistyped.
         """
         started = time.monotonic()
+        now = now and not self._holds_another
         if not self._writable or (not now and started - self._last < max(SECONDS, SHARE * self._cost)):
             return
         images = state.images
@@ -105,7 +110,7 @@ class Checkpoint:
             with atomic_write(self.path) as out:
                 out.write(MAGIC)
                 np.savez(out, **arrays)
-            self.holds = True
+            self.holds, self._holds_another = True, False
         except OSError as error:
             self._writable = False
             self._say(f"{self.path}: {error.strerror}; the render goes on, but could not be resumed from here")
@@ -113,8 +118,8 @@ class Checkpoint:
         self._cost = self._last - started
 
     def remove(self) -> None:
-        """The render is finished and written: nothing is left to go on from, nor an older state."""
-        if self.path.is_file() and _starts_with_magic(self.path):
+        """The render is finished and written: its state goes, and what is broken; that of another render stays."""
+        if not self._holds_another and self.path.is_file() and _starts_with_magic(self.path):
             self.path.unlink()
 
 
