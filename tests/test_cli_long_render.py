@@ -145,13 +145,18 @@ def test_an_interruption_waits_for_the_end_of_the_block():
     """And is not lost, if the block makes another error of it."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     reached = []
+
+    @undisturbed()
+    def interrupted(error):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.01)
+        reached.append(error)
+        if error:
+            raise RuntimeError
+
     for error in (False, True):
-        with pytest.raises(KeyboardInterrupt), undisturbed():  # noqa: PT012
-            os.kill(os.getpid(), signal.SIGINT)
-            time.sleep(0.01)
-            reached.append(error)
-            if error:
-                raise RuntimeError
+        with pytest.raises(KeyboardInterrupt):
+            interrupted(error)
     assert reached == [False, True]
     with pytest.raises(RuntimeError), undisturbed():
         raise RuntimeError

@@ -9,6 +9,7 @@ from argparse import Namespace
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -103,8 +104,8 @@ def render(options: Namespace) -> dict[str, Any]:
         print(f"warning: {sentence}", file=sys.stderr)
 
     check_rendering(options)
-    outputs = _outputs(options)
     pairs = _pairs(options)
+    outputs = _outputs(options, pairs)
     materials = Materials(options.lookup)
     pairs, identity, labels = _looked_at(pairs, materials, options, warn)
     setting = _setting(options, warn)
@@ -147,11 +148,9 @@ def render(options: Namespace) -> dict[str, Any]:
     return result | {"warnings": warnings}
 
 
-def _outputs(options: Namespace) -> dict[str, Path]:
+def _outputs(options: Namespace, pairs: Sequence[Pair]) -> dict[str, Path]:
     """The files of a comparison, by what they show."""
-    inputs = [*options.materials, *options.against, options.envmap, options.mesh]
-    if options.scene == GRID:
-        inputs += [file for source in options.materials for file in _files(source)]
+    inputs = [*(pair.source for pair in pairs), *options.against, options.envmap, options.mesh]
     check_output(options.output, (".png", ".exr"), *inputs)
     check_apart(checkpoint_of(options.output), *inputs)
     if not options.against:
@@ -286,13 +285,12 @@ def _compared(
     options: Namespace, pairs: Sequence[Pair], references: Sequence[Image], candidates: Sequence[Image]
 ) -> Comparison:
     """The images of a scene, or those spheres of a grid that have a reference, each without empty places."""
-    both = list(zip(references, candidates, strict=True))
     if options.scene == GRID:
-        both = [images for images, pair in zip(both, pairs, strict=True) if pair.against is not None]
+        held = [pair.against is not None for pair in pairs]
+        references, candidates = (list(compress(images, held)) for images in (references, candidates))
     with console.progress("comparing"):
-        a, b = ([images[which] for images in both] for which in (0, 1))
-        measured = Comparison.of(_sheet(a, 1), _sheet(b, 1))
-    return replace(measured, reference=_sheet(a), candidate=_sheet(b))
+        measured = Comparison.of(_sheet(references, 1), _sheet(candidates, 1))
+    return replace(measured, reference=_sheet(references), candidate=_sheet(candidates))
 
 
 def _held_against(pairs: Sequence[Pair], labels: Sequence[tuple[str, str]]) -> tuple[str, str]:

@@ -10,9 +10,8 @@ import numpy as np
 from ..arrays import split
 from ..formats.scattered import REACH, ScatteredTable
 from ..half_diff import half_diff, spherical
-from ..optional import optional
 from ..style import plain_style
-from .page import save
+from .page import matplotlib, save
 
 INCIDENCES = (10, 45, 75)  # degrees
 
@@ -21,8 +20,7 @@ def coverage(table: ScatteredTable, path: Path) -> None:
     """Writes a PNG of which directions were measured: the share of φ_d over θ_h and θ_d, and the hemisphere of `wo` for
     three elevations of `wi`. Raises MissingDependencyError without matplotlib."""
     with plain_style():
-        figures = optional("matplotlib.figure", "matplotlib", "plots", "formats")
-        figure = figures.Figure(figsize=(13, 3.6), layout="constrained")
+        figure = matplotlib().Figure(figsize=(13, 3.6), layout="constrained")
         share = f"{table.facts['coverage']:.1%} of the lattice (by solid angle and cosines)"
         figure.suptitle(
             f"{table.name}: {len(table.samples.wi)} samples; {share} within {np.degrees(REACH):.0f}° of one (yellow)",

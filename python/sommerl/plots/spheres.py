@@ -19,8 +19,8 @@ def fits(name: str, models: Sequence[str], comparisons: Sequence[Comparison], pa
 
     comparisons: of `compare_on_sphere`, one a model. Raises MissingDependencyError without matplotlib.
     """
+    figures = optional("matplotlib.figure", "matplotlib", "plots", "fit")
     with plain_style():
-        figures = optional("matplotlib.figure", "matplotlib", "plots", "fit")
         cells = [(name, [comparisons[0].pictures()[0]])]
         for model, comparison in zip(models, comparisons, strict=True):
             cells.append((f"{model}: {comparison.metrics.psnr_object_db:.1f} dB", comparison.pictures()[1:]))

@@ -119,8 +119,8 @@ class Checkpoint:
 
     def remove(self) -> None:
         """The render is finished and written: its state goes, and what is broken; that of another render stays."""
-        if not self._holds_another and self.path.is_file() and _starts_with_magic(self.path):
-            self.path.unlink()
+        if not self._holds_another:
+            self.path.unlink(missing_ok=True)
 
 
 def checkpoint_of(output: Path) -> Path:

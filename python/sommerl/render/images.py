@@ -107,16 +107,17 @@ def _lettered(shape: tuple[int, ...], words: Sequence[tuple[float, float, str, i
     """Words on white: where their middle is, what they are, and how many pixels they may take."""
     figures = optional("matplotlib.figure", "matplotlib", "labels", "render")
     agg = optional("matplotlib.backends.backend_agg", "matplotlib", "labels", "render")
+    size = 0.72 * height  # of the font
     with plain_style():
         figure = figures.Figure(figsize=((shape[1] + 0.5) / 100, (shape[0] + 0.5) / 100), dpi=100)
         canvas = agg.FigureCanvasAgg(figure)
         for x, y, word, room in words:
             # No mathematics: a dollar or an underscore in a name is one.
             place = x / shape[1], 1 - y / shape[0]
-            drawn = figure.text(*place, word, fontsize=0.72 * height, ha="center", va="center", parse_math=False)
+            drawn = figure.text(*place, word, fontsize=size, ha="center", va="center", parse_math=False)
             taken = drawn.get_window_extent(canvas.get_renderer()).width
             if taken > room - 2:
-                drawn.set_fontsize(0.72 * height * (room - 2) / taken)
+                drawn.set_fontsize(size * (room - 2) / taken)
         canvas.draw()
         return np.asarray(canvas.buffer_rgba())[: shape[0], : shape[1], :3]
 

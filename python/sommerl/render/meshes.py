@@ -155,8 +155,8 @@ def _agreement(positions: NDArray[np.float32], faces: NDArray[np.uint32], normal
 
 def _volume(positions: NDArray[np.float32], faces: NDArray[np.uint32]) -> float:
     """The signed volume: positive if faces are anticlockwise from outside."""
-    a, b, c = (positions[faces[:, k]].astype(np.float64) - positions.mean(axis=0) for k in range(3))
-    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+    corners = positions[faces[:, 0]].astype(np.float64) - positions.mean(axis=0)
+    return float((corners * _face_normals(positions, faces)).sum() / 6)
 
 
 def lathe(
