@@ -26,7 +26,13 @@ class NumpyOps:
     where = staticmethod(np.where)
 
     @staticmethod
+    def bin(x: Array, count: int) -> Array:
+        """Which of `count` bins of width 1 holds x, from 0 to count - 1; of what is no number, the first."""
+        return np.asarray(np.fmin(np.fmax(x, 0.0), count - 1.0)).astype(np.int64)
+
+    @staticmethod
     def to_index(x: Array) -> Array:
+        """A whole number from a table, as an index."""
         return np.asarray(x).astype(np.int64)
 
     @staticmethod
@@ -49,20 +55,36 @@ class Packed16:
 
 
 class DrjitOps:
-    """The same functions, on Dr.Jit arrays."""
+    """The same functions, on Dr.Jit arrays.
+
+    Lanes that are not active may hold anything, also what is no number: nothing that is computed from them may become
+    an index out of range. So every index starts from `bin`.
+
+    Where a function has no finite derivative (√x at 0, the azimuth of what has no length, powers of 0), its derivative
+    is taken for 0: directions that coincide with the normal, the mirror's or each other are common in renderings, and
+    one gradient that is no number spoils the sum over all.
+    """
 
     def __init__(self, dr: Any) -> None:
         self._dr = dr
-        self.sqrt, self.sin, self.cos, self.exp, self.log, self.power = (
-            dr.sqrt,
-            dr.sin,
-            dr.cos,
-            dr.exp,
-            dr.log,
-            dr.power,
-        )
-        self.atan2, self.floor = dr.atan2, dr.floor
+        self.sin, self.cos, self.exp, self.log, self.floor = dr.sin, dr.cos, dr.exp, dr.log, dr.floor
         self.minimum, self.maximum, self.where = dr.minimum, dr.maximum, dr.select
+
+    def sqrt(self, x: Array) -> Array:
+        above = x > 0.0
+        return self.where(above, self._dr.sqrt(self.where(above, x, 1.0)), 0.0)
+
+    def atan2(self, y: Array, x: Array) -> Array:
+        nowhere = (y == 0.0) & (x == 0.0)
+        return self._dr.atan2(y, self.where(nowhere, 1.0, x))
+
+    def power(self, x: Array, exponent: Array) -> Array:
+        above = x > 0.0
+        return self.where(above, self._dr.power(self.where(above, x, 1.0), exponent), 0.0)
+
+    def bin(self, x: Array, count: int) -> Array:
+        # What is no number is not above 0.
+        return self.to_index(self.where(x > 0.0, self.minimum(x, count - 1.0), 0.0))
 
     def to_index(self, x: Array) -> Array:
         return self._dr.uint32_array_t(type(x))(x)

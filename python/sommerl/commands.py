@@ -40,6 +40,7 @@ from .models.multi_lobe import MultiLobe
 from .render.compare import compare_on_sphere, judge_on_sphere
 from .render.environment import default_environment, load_environment
 from .render.images import side_by_side, write_image
+from .render.llvm import require_compiler
 from .render.passes import LARGEST_SIZE
 from .som_man import budget
 from .som_man import file as smrl
@@ -137,8 +138,9 @@ def compact_one(brdf: Brdf, output: Path, options: CompactOptions, quiet: bool) 
 
 
 def _judge(brdf: Brdf, options: CompactOptions) -> budget.Quality | None:
-    """The renderer; without it, the fit's own error has to do where a size is asked for."""
+    """The renderer; without it or a compiler for it, the fit's own error has to do where a size is asked for."""
     try:
+        require_compiler()
         return judge_on_sphere(brdf, default_environment())
     except MissingDependencyError:
         if options.target_size is None:

@@ -51,6 +51,12 @@ def has_llvm(dr: Any) -> bool:
     return dr.has_backend(dr.JitBackend.LLVM) and dr.detail.llvm_version()[0] >= OLDEST_LLVM
 
 
+def found_llvm(dr: Any) -> str:
+    """What Dr.Jit found, for people."""
+    active = dr.has_backend(dr.JitBackend.LLVM)
+    return f"libLLVM {dr.detail.llvm_version()[0]}" if active else "none that Dr.Jit takes"
+
+
 def choose_llvm() -> None:
     """Tells Dr.Jit, if not imported yet, which libLLVM to load: none rather than one that it would find by itself."""
     if "drjit" not in sys.modules:

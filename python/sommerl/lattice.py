@@ -106,9 +106,9 @@ class Lattice:
         """The number of the cell that holds the given angles [rad]."""
         f = ops(theta_h)
         u, v, w = self._position(theta_h, theta_d, phi_d)
-        i = f.to_index(f.minimum(u, self.theta_h - 1.0))
-        j = f.to_index(f.minimum(v, self.theta_d - 1.0))
-        k = f.to_index(f.minimum(w, self.phi_d - 1.0))
+        i = f.bin(u, self.theta_h)
+        j = f.bin(v, self.theta_d)
+        k = f.bin(w, self.phi_d)
         return k + self.phi_d * (j + self.theta_d * i)
 
     def corners(self, theta_h: Array, theta_d: Array, phi_d: Array) -> list[tuple[Array, Array]]:
@@ -122,7 +122,7 @@ class Lattice:
         w = w - 0.5
         below = f.floor(w)
         c = w - below
-        k0 = f.to_index(f.where(below < 0.0, below + self.phi_d, f.minimum(below, self.phi_d - 1.0)))
+        k0 = f.bin(f.where(below < 0.0, below + self.phi_d, below), self.phi_d)
         k1 = f.where(k0 + 1 >= self.phi_d, 0 * k0, k0 + 1)
         return [
             (k + self.phi_d * (j + self.theta_d * i), p * q * r)
@@ -167,5 +167,5 @@ def _between(f: Any, position: Array, bins: int) -> tuple[Array, Array, Array]:
     """The bins whose centres are on either side, clamped, and the weight of the upper one."""
     x = f.minimum(f.maximum(position - 0.5, 0.0), bins - 1.0)
     lower = f.minimum(f.floor(x), max(bins - 2.0, 0.0))
-    index = f.to_index(lower)
+    index = f.bin(lower, max(bins - 1, 1))
     return index, index + min(1, bins - 1), x - lower

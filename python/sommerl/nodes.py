@@ -94,7 +94,7 @@ class NodeLattice:
     def corners(self, x: Array, y: Array, z: Array, buffers: Buffers) -> list[tuple[Array, Array]]:
         """The 8 nodes about a place on the fine grid (θ_h, θ_d, φ_d), and their weights, which add up to 1."""
         f = ops(x)
-        step = [f.to_index(f.minimum(f.maximum(c, 0.0), FINE - 1.0)) for c in (x, y, z)]
+        step = [f.bin(c, FINE) for c in (x, y, z)]
         row = f.gather(buffers["row_below"], step[0])
         t = _share(f, buffers["row_place"], row, x)
         found: list[tuple[Array, Array]] = []
@@ -159,7 +159,7 @@ class FittedTable(Brdf):
         self.nodes, self.values, self.scale, self.name = nodes, values, scale, name
 
     def buffers(self) -> dict[str, NDArray[Any]]:
-        return self.nodes.buffers() | {"values": self.values.reshape(-1), "scale": np.array([self.scale])}
+        return self.nodes.buffers() | {"values": self.values.reshape(-1), "scale": np.array(self.scale)}
 
     def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
         y = self.nodes.lookup(wi, wo, lambda node: gather3(buffers["values"], node), buffers)

@@ -222,26 +222,6 @@ def test_paths_in_a_scene_file_may_be_relative_to_it(tmp_path):
     assert "nickel" in str(mi.load_file(str(scene)).shapes()[0].bsdf())
 
 
-def test_a_variant_that_is_set_stays_and_only_rgb_will_do():
-    code = """
-import mitsuba as mi
-from sommerl.errors import SommerlError
-from sommerl.render.bsdf import register
-mi.set_variant("scalar_rgb")
-register()
-print(mi.variant(), mi.load_dict({"type": "sommerl", "filename": "nickel"}))
-mi.set_variant("scalar_spectral")
-try:
-    register()
-except SommerlError as error:
-    print(error)
-"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    first, second = done.stdout.splitlines()
-    assert first == "scalar_rgb SommerlBsdf[nickel (SGD stand-in)]"
-    assert second == "Mitsuba's variant: expected one of RGB, like llvm_ad_rgb, found scalar_spectral"
-
-
 def test_scalar_mode_warns_and_gives_the_same():
     """Without any usable LLVM, in a process of its own."""
     code = """

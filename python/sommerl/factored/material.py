@@ -140,7 +140,7 @@ def between_middles(place: Array, count: int) -> tuple[Array, Array]:
     """The first of two neighbouring intervals whose middles a place is between, and the second one's share."""
     f = ops(place)
     from_first = f.minimum(f.maximum(place - 0.5, 0.0), count - 1.0)
-    first = f.to_index(f.minimum(from_first, count - 2.0))
+    first = f.bin(from_first, count - 1)
     return first, from_first - first
 
 

@@ -131,8 +131,8 @@ class RglBrdf(Brdf):
         """The incident elevations on either side of the given one, as indices, and their weights."""
         last = len(self._theta_i) - 1
         if last == 0:
-            return [(f.to_index(0.0 * theta_i), 1.0)]
-        lower = f.to_index(sum(f.where(theta_i >= angle, 1.0, 0.0) for angle in self._theta_i[1:-1]) + 0.0 * theta_i)
+            return [(f.bin(0.0 * theta_i, 1), 1.0)]
+        lower = f.bin(sum(f.where(theta_i >= angle, 1.0, 0.0) for angle in self._theta_i[1:-1]) + 0.0 * theta_i, last)
         a, b = f.gather(buffers["theta_i"], lower), f.gather(buffers["theta_i"], lower + 1)
         t = f.minimum(f.maximum((theta_i - a) / (b - a), 0.0), 1.0)
         return [(lower, 1.0 - t), (lower + 1, t)]
@@ -272,7 +272,7 @@ def _cell(f: Any, x: Array, points: int) -> tuple[Array, Array]:
     """The point below x in [0, 1], of so many, and the share of the way to the next."""
     x = f.minimum(f.maximum(x, 0.0), 1.0) * (points - 1)
     below = f.minimum(f.floor(x), points - 2.0)
-    return f.to_index(below), x - below
+    return f.bin(below, points - 1), x - below
 
 
 def _corners(f: Any, x: Array, y: Array, shape: tuple[int, ...]) -> list[tuple[Array, Array]]:

@@ -4,31 +4,56 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import re
 import warnings
 from functools import cache
 from typing import Any
 
 from .. import jit
-from ..errors import MissingDependencyError
+from ..errors import MissingDependencyError, OptionError
 from ..interrupt import undisturbed
 
+WANTED = f"a GPU, or a libLLVM {jit.OLDEST_LLVM} or newer"
+REMEDY = f"on Linux, install sommerl[render], or set {jit.PATH_VARIABLE}"
+USABLE = re.compile(r"(scalar|llvm|llvm_ad|cuda|cuda_ad)_(rgb|mono|spectral)(_polarized)?")
 
-def mitsuba() -> Any:
+
+def mitsuba(variant: str | None = None) -> Any:
     """The module `mitsuba` with a variant set: the one that is set already, or CUDA if there is a GPU, else LLVM, else
-    scalar, with a warning.
+    scalar, with a warning. variant: the one that is to be set.
 
-    Raises MissingDependencyError if Mitsuba is not installed, or the variant that is set is not one of RGB.
+    Raises MissingDependencyError if Mitsuba is not installed, or the variant that is set cannot be used: for a kind of
+    colour that is not known here, or for want of an LLVM that works. OptionError for a variant that cannot be chosen.
     """
     mi = _module()
-    if mi.variant() is None:
+    if variant is not None and variant not in usable_variants():
+        raise OptionError(f"variant: expected {' or '.join(usable_variants())}, found {variant}")
+    if mi.variant() is None or variant not in (None, mi.variant()):
         with undisturbed():
-            mi.set_variant(_variant(mi))
+            mi.set_variant(variant or _fastest(mi))
             dr = jit.drjit()
             if dr.thread_count() < 2:
                 dr.set_thread_count(2)  # with one, Mitsuba waits for ever when it reads or writes OpenEXR files
-    if not mi.variant().endswith("rgb"):
-        raise MissingDependencyError(f"Mitsuba's variant: expected one of RGB, like llvm_ad_rgb, found {mi.variant()}")
+    _check(mi.variant())
     return mi
+
+
+def usable_variants() -> list[str]:
+    """The variants of the Mitsuba that is installed which this package works in."""
+    return [variant for variant in _module().variants() if USABLE.fullmatch(variant)]
+
+
+@cache
+def _check(variant: str) -> None:
+    """Raises MissingDependencyError if the variant is none that can be used: Mitsuba would end the process later."""
+    if not USABLE.fullmatch(variant):
+        raise MissingDependencyError(f"Mitsuba's variant: expected {' or '.join(usable_variants())}, found {variant}")
+    dr = jit.drjit()
+    if variant.startswith("llvm") and not jit.has_llvm(dr):
+        raise MissingDependencyError(
+            f"Mitsuba's variant {variant}: expected a libLLVM {jit.OLDEST_LLVM} or newer, found {jit.found_llvm(dr)}; "
+            f"call sommerl.render.llvm.mitsuba() before anything imports Dr.Jit, or set {jit.PATH_VARIABLE}"
+        )
 
 
 @cache
@@ -46,16 +71,23 @@ def drjit() -> Any:
     return jit.drjit()
 
 
-def _variant(mi: Any) -> str:
+def require_compiler() -> None:
+    """Raises MissingDependencyError if renders would be in scalar mode, hundreds of times slower."""
+    mi = _module()
+    if (mi.variant() or _fastest(mi, warn=False)).startswith("scalar"):
+        raise MissingDependencyError(f"rendering: expected {WANTED}, found neither; {REMEDY}")
+
+
+def _fastest(mi: Any, *, warn: bool = True) -> str:
     available = set(mi.variants())
     dr = jit.drjit()
     if "cuda_ad_rgb" in available and dr.has_backend(dr.JitBackend.CUDA):
         return "cuda_ad_rgb"
     if "llvm_ad_rgb" in available and jit.has_llvm(dr):
         return "llvm_ad_rgb"
-    warnings.warn(
-        f"no GPU and no libLLVM {jit.OLDEST_LLVM} or newer: rendering falls back to scalar mode, some 300 times "
-        f"slower; on Linux, install sommerl[render], or set {jit.PATH_VARIABLE}",
-        stacklevel=3,
-    )
+    if warn:
+        warnings.warn(
+            f"expected {WANTED}, found neither: rendering falls back to scalar mode, some 300 times slower; {REMEDY}",
+            stacklevel=4,
+        )
     return "scalar_rgb"

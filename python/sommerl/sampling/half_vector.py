@@ -24,9 +24,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from ..arrays import Array, Triple, ops
+from ..arrays import Array, Triple, gather3, ops
 from ..brdf import Brdf, Buffers
-from .sampler import Sampler
+from .sampler import PI, Sampler
 
 ROWS, COLUMNS = 20, 8  # cells in s and, on one side of the plane of the viewer, in c
 ELEVATIONS = 12  # of the viewer; dense at grazing angles, where lobes change fastest
@@ -40,6 +40,7 @@ TINY = 1e-9  # added to lengths along x, so that the azimuth of the normal itsel
 LOWEST = 1e-4  # cos θ_o of the table's lowest elevation, 0 but for numbers that need some width
 DIFFUSE = 0.01  # share of directions that follow the cosine
 FINER = 3  # places looked at along each side of a cell
+VIEWERS = 31  # elevations that albedos are tabulated for, equal in θ_o
 NEIGHBOUR = 0.07  # a cell gets at least that share of the brightest light in and about it, which bounds weights
 
 
@@ -70,7 +71,7 @@ class HalfVectorSampler(Sampler):
         first, t = _elevation(wo[2])
         second = u[0] < t
         again = f.where(second, u[0], u[0] - t) / f.where(second, t, 1.0 - t)
-        slot = f.to_index(f.minimum(again * WHOLE, WHOLE - 1.0))
+        slot = f.bin(again * WHOLE, WHOLE)
         cell = slot >> SLOT_BITS
         word = f.gather(table, cell + f.where(second, first + CELLS, first))
         cell = f.where((slot & (SLOTS - 1)) < (word >> 24), (word >> 16) & 255, cell)
@@ -95,8 +96,8 @@ class HalfVectorSampler(Sampler):
         s = f.sqrt(f.sqrt(f.sqrt(f.minimum(flat / ((flat + hz * hz) * extent), 1.0))))
         rim = 1.0 / f.maximum(abs(along) + abs(across), TINY * TINY)
         c = 1.0 - along * rim
-        row = f.to_index(f.minimum(s * ROWS, ROWS - 1.0))
-        column = f.to_index(f.minimum(c * (COLUMNS / 2), COLUMNS - 1.0))
+        row = f.bin(s * ROWS, ROWS)
+        column = f.bin(c * (COLUMNS / 2), COLUMNS)
         first, t = _elevation(wo[2])
         share = _share(buffers["table"], first, t, column + COLUMNS * row)
         # As in `_mirrored`, with the lengths that cancel left out.
@@ -104,11 +105,33 @@ class HalfVectorSampler(Sampler):
         return f.where(above, pdf, 0.0)
 
 
+def albedos(brdf: Brdf) -> NDArray[np.float64]:
+    """The share of even light that a BRDF reflects to viewers at VIEWERS elevations, (VIEWERS, 3): see `albedo_at`.
+
+    It is evaluated for about 20,000 pairs of directions.
+    """
+    # At the normal itself, and on the horizon, data may be of another kind than right beside.
+    theta = np.clip(np.arange(VIEWERS) / (VIEWERS - 1) * PI / 2, 0.01, PI / 2 - 0.01)
+    return _light(brdf, np.cos(theta), 2)[0].mean(axis=(1, 2, 3))
+
+
+def albedo_at(cos_o: Array, table: Any) -> Triple:
+    """The albedo for viewers at that cosine: interpolated in θ_o from a table of `albedos`, flat."""
+    f = ops(cos_o)
+    sin = f.sqrt(f.maximum(1.0 - cos_o * cos_o, 0.0))
+    x = f.atan2(sin, cos_o) * (2 / PI * (VIEWERS - 1))
+    first = f.bin(x, VIEWERS - 1)
+    t = x - first
+    here, next_ = gather3(table, first), gather3(table, first + 1)
+    r, g, b = (a + t * (b - a) for a, b in zip(here, next_, strict=True))
+    return r, g, b
+
+
 def _elevation(cos_o: Array) -> tuple[Array, Array]:
     """Of two neighbouring elevations of the table, where the first one's cells begin, and the second one's share."""
     f = ops(cos_o)
     x = f.sqrt(f.maximum(cos_o, 0.0)) * (ELEVATIONS - 1)
-    node = f.to_index(f.minimum(x, ELEVATIONS - 2.0))
+    node = f.bin(x, ELEVATIONS - 1)
     return CELLS * node, x - node
 
 
@@ -158,10 +181,10 @@ def _mirrored(s: Array, c: Array, side: Array, wo: Triple) -> tuple[Triple, Arra
     return wi, 64.0 * (s6 * s) * extent * dot / (cos * round_)
 
 
-def _light(brdf: Brdf, cos_o: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The light f_r cos θ_i dω_i of places in the unit square, FINER² in each cell, and cos θ_i dω_i alone; of shape
+def _light(brdf: Brdf, cos_o: NDArray[np.float64], finer: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The light f_r cos θ_i dω_i of places in the unit square, finer² in each cell, and cos θ_i dω_i alone; of shape
     (elevations, ROWS, COLUMNS, places, channels) and without channels."""
-    s, c = (((np.arange(FINER * n) + 0.5) / (FINER * n)) for n in (ROWS, COLUMNS))
+    s, c = (((np.arange(finer * n) + 0.5) / (finer * n)) for n in (ROWS, COLUMNS))
     z, s, c = np.broadcast_arrays(cos_o[:, None, None], s[:, None], 2 * c)
     wo = np.sqrt(1 - z * z), np.zeros_like(z), z
     wi, solid_angle = _mirrored(s, c, np.ones_like(c), wo)
@@ -169,8 +192,8 @@ def _light(brdf: Brdf, cos_o: NDArray[np.float64]) -> tuple[NDArray[np.float64],
     light = brdf.eval(np.stack(wi, axis=-1), np.stack(wo, axis=-1)) * cosine[..., None]
 
     def of_cells(values: NDArray[np.float64], *channels: int) -> NDArray[np.float64]:
-        grouped = values.reshape(len(cos_o), ROWS, FINER, COLUMNS, FINER, *channels).swapaxes(2, 3)
-        return grouped.reshape(len(cos_o), ROWS, COLUMNS, FINER**2, *channels)
+        grouped = values.reshape(len(cos_o), ROWS, finer, COLUMNS, finer, *channels).swapaxes(2, 3)
+        return grouped.reshape(len(cos_o), ROWS, COLUMNS, finer**2, *channels)
 
     return of_cells(light, 3), of_cells(cosine)
 
@@ -182,7 +205,7 @@ def _probabilities(brdf: Brdf) -> NDArray[np.float64]:
     """
     # Each table serves the elevations about it, so that those between are looked at, too.
     between = 2 * ELEVATIONS - 1
-    light, cosine = _light(brdf, np.maximum((np.arange(between) / (between - 1)) ** 2, LOWEST))
+    light, cosine = _light(brdf, np.maximum((np.arange(between) / (between - 1)) ** 2, LOWEST), FINER)
     rms = np.sqrt((light * light).mean(axis=(-2, -1)))
     rms /= _positive(rms.sum(axis=(1, 2), keepdims=True))
     albedo = light.mean(axis=-2, keepdims=True).sum(axis=(1, 2), keepdims=True)

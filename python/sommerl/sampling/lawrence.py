@@ -120,8 +120,8 @@ class LawrenceSampler(Sampler):
         f = ops(wi[0])
         above = (wi[2] > 0.0) & (wo[2] > 0.0)
         theta_h, phi_h = half_from_viewer(wi, wo)
-        row = f.to_index(f.minimum(row_of(theta_h), ROWS - 1.0))
-        column = f.to_index(f.minimum(column_of(phi_h), COLUMNS - 1.0))
+        row = f.bin(row_of(theta_h), ROWS)
+        column = f.bin(column_of(phi_h), COLUMNS)
         node, t = between_middles(elevation_of(wo), ELEVATIONS)
         count, lobes = len(self.mass), self.share.shape[1]
         total = 0.0 * t

@@ -97,7 +97,7 @@ def _polar(w: Triple) -> Array:
 def _bin(x: Array, width: float, count: int) -> Array:
     """The number of the bin that holds x, the last one for what is beyond."""
     f = ops(x)
-    return f.to_index(f.minimum(x * (1 / width), count - 1.0))
+    return f.bin(x * (1 / width), count)
 
 
 def _elevation(wo: Triple) -> Array:

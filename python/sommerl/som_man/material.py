@@ -137,7 +137,7 @@ class SomManBrdf(OnLattice):
     def buffers(self) -> dict[str, NDArray[Any]]:
         buffers: dict[str, NDArray[Any]] = {"index": self._index.reshape(-1), "lut": self.lut.reshape(-1)}
         if isinstance(self.lattice, NodeLattice):
-            buffers |= {"gain_index": self.gain_index, "gains": self.gains, "scale": np.array([self.scale])}
+            buffers |= {"gain_index": self.gain_index, "gains": self.gains, "scale": np.array(self.scale)}
             buffers |= self.lattice.buffers()
         return buffers
 
