@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 import time
 from argparse import Namespace
+from collections.abc import Generator
+from contextlib import contextmanager
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -37,6 +39,7 @@ from .formats.names import split_member
 from .load import EXTENSIONS, interpolated, load, load_table
 from .metrics import table_metrics
 from .models.multi_lobe import MultiLobe
+from .render.checkpoint import Checkpoint
 from .render.compare import compare_on_sphere, judge_on_sphere
 from .render.environment import default_environment, load_environment
 from .render.images import side_by_side, write_image
@@ -312,13 +315,30 @@ def check_apart(path: Path, *sources: str | Path | None) -> None:
             raise OptionError(f"{path}: expected an output other than the input")
 
 
+def check_range(name: str, value: int, low: int, high: int) -> None:
+    """Raises OptionError for a number out of range."""
+    if not low <= value <= high:
+        raise OptionError(f"{name}: expected {low} to {high}, found {value}")
+
+
 def check_rendering(options: Namespace) -> None:
     """Checks the options that all renderings have."""
     for name, low, high in (("spp", 1, MOST_SPP), ("size", SMALLEST_SIZE, LARGEST_SIZE), ("seed", 0, 2**64 - 1)):
-        if not low <= getattr(options, name) <= high:
-            raise OptionError(f"{name}: expected {low} to {high}, found {getattr(options, name)}")
+        check_range(name, getattr(options, name), low, high)
     if options.envmap and not options.envmap.is_file():
         raise FormatError(f"{options.envmap}: expected an environment image, found no file")
+
+
+@contextmanager
+def goes_on_from(checkpoint: Checkpoint) -> Generator[console.Advance | None]:
+    """A progress bar for a render; if that is interrupted, it is said whether it can go on."""
+    try:
+        with console.progress("rendering") as advance:
+            yield advance
+    except KeyboardInterrupt:
+        if checkpoint.holds:
+            print(f"{checkpoint.path}: from here, the same command goes on", file=sys.stderr)
+        raise
 
 
 def environment_of(options: Namespace) -> Any:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Packed16
 from ..brdf import Brdf
+from ..formats import scene
 from ..load import interpolated, load
 from ..sampling import named
 from ..sampling.sampler import Sampler
@@ -34,13 +35,21 @@ def register() -> None:
 
     Properties: `filename`, a built-in's name or a path, which may be relative to the scene file; `interpolation`,
     nearest or trilinear, if it is not to be the material's own; `sampler`, one of the names in `sampling.named`, if it
-    is not to be ours.
+    is not to be ours; `comment`, which is for people.
     """
     mitsuba().register_bsdf("sommerl", _from_properties)
 
 
+def snippet(path: str | Path) -> dict[str, Any]:
+    """A material's dictionary, for `load_dict` after `register`, from a .json that `sommerl convert` wrote: the place
+    of the material, in the file relative to the file, is made absolute. Raises FormatError if it is no such file."""
+    return scene.read(Path(path).absolute())
+
+
 def _from_properties(props: Any) -> Any:
     name = str(props["filename"])
+    if "comment" in props:
+        props.mark_queried("comment")  # Mitsuba refuses what nobody reads
     # Of "FILE:MEMBER", only the file is to be found; a colon may also be part of its name.
     resolve = mitsuba().file_resolver().resolve
     places = [(name, "")] + [(name[:at], name[at:]) for at, character in enumerate(name) if character == ":"]

@@ -9,26 +9,38 @@ from functools import cache
 from typing import Any
 
 from .. import jit
-from ..errors import MissingDependencyError
+from ..errors import MissingDependencyError, OptionError
 from ..interrupt import undisturbed
 
 
-def mitsuba() -> Any:
-    """The module `mitsuba` with a variant set: the one that is set already, or CUDA if there is a GPU, else LLVM, else
-    scalar, with a warning.
+def mitsuba(variant: str | None = None) -> Any:
+    """The module `mitsuba` with a variant set: the one that is given, or set already, or CUDA if there is a GPU, else
+    LLVM, else scalar, with a warning.
 
-    Raises MissingDependencyError if Mitsuba is not installed, or the variant that is set is not one of RGB.
+    Raises MissingDependencyError if Mitsuba is not installed, or the variant that is set is not one of RGB; OptionError
+    if the one that is given cannot be used.
     """
     mi = _module()
-    if mi.variant() is None:
+    if variant is not None and variant not in usable(mi):
+        raise OptionError(f"variant: expected {', '.join(usable(mi))}, found {variant}")
+    wanted = variant or mi.variant() or _variant(mi)
+    if wanted != mi.variant():
         with undisturbed():
-            mi.set_variant(_variant(mi))
+            mi.set_variant(wanted)
             dr = jit.drjit()
             if dr.thread_count() < 2:
                 dr.set_thread_count(2)  # with one, Mitsuba waits for ever when it reads or writes OpenEXR files
     if not mi.variant().endswith("rgb"):
         raise MissingDependencyError(f"Mitsuba's variant: expected one of RGB, like llvm_ad_rgb, found {mi.variant()}")
     return mi
+
+
+def usable(mi: Any) -> list[str]:
+    """The variants that the plug-in knows and this machine can run."""
+    dr = jit.drjit()
+    cuda, llvm = dr.has_backend(dr.JitBackend.CUDA), jit.has_llvm(dr)
+    runs = {"scalar": True, "llvm": llvm, "cuda": cuda}
+    return [name for name in mi.variants() if name.endswith("rgb") and runs[name.split("_")[0]]]
 
 
 @cache
