@@ -21,6 +21,7 @@ from .describe import (
     image_rows,
     label,
     lookup,
+    origin_rows,
     print_fits,
     table_rows,
     text,
@@ -53,6 +54,7 @@ from .table import BrdfTable
 
 SMALLEST_SIZE = 8  # SSIM looks at windows of 7 pixels
 MOST_SPP = 2**20
+HIDDEN = ("facts", "lobes", "made_from", "measured_against")  # keys that `info` shows for people in rows of their own
 
 
 def compress(options: Namespace) -> dict[str, Any]:
@@ -155,13 +157,11 @@ def info(options: Namespace) -> dict[str, Any]:
     on_disk = path.stat().st_size if path.is_file() else None
     result = describe(brdf, on_disk)
     if not options.json:
-        shown = {
-            key: value for key, value in result.items() if value not in (None, "", {}) and key not in ("facts", "lobes")
-        }
+        shown = {key: value for key, value in result.items() if value not in (None, "", {}) and key not in HIDDEN}
         for key in ("bytes_paper", "bytes_memory", "bytes_disk"):
             if key in shown:
                 shown[key] = console.size(shown[key])
-        rows = {key: text(value) for key, value in shown.items()} | fact_rows(result["facts"] or {})
+        rows = {key: text(value) for key, value in shown.items()} | fact_rows(result["facts"] or {}) | origin_rows(brdf)
         if isinstance(brdf, MultiLobe):
             rows |= {f"lobe {number}": str(lobe) for number, lobe in enumerate(brdf.lobes, 1)}
         console.print_rows(str(options.material), rows)
@@ -245,6 +245,7 @@ def factor(options: Namespace) -> dict[str, Any]:
             "size in memory": console.size(material.bytes_memory),
             "size on disk": console.size(written),
             **fact_rows(known["facts"]),
+            **origin_rows(material),
             "time": f"{seconds:.1f} s",
         }
         console.print_rows(f"{material.name} → {options.output}", rows)
