@@ -1,3 +1,4 @@
+import hashlib
 import os
 import signal
 import subprocess
@@ -296,8 +297,10 @@ def test_a_bad_input_among_several_is_found_before_anything_is_written(capsys, t
 def test_compressing_a_compressed_material_again(capsys, folder, tmp_path):
     result = run_json(capsys, "compress", folder / "pearl.smrl", "-o", tmp_path, "--clusters", 4, "--epochs", 1)
     assert result["output"] == str(tmp_path / "pearl.smrl")
+    # It is made from that file, and that file from what it says.
     info = run_json(capsys, "info", folder / "pearl.smrl")
-    assert result["source_sha256"] == info["source_sha256"]
+    assert result["source_sha256"] == hashlib.sha256((folder / "pearl.smrl").read_bytes()).hexdigest()
+    assert result["made_from"][1]["sha256"] == info["source_sha256"]
 
 
 def test_360_bins_survive_every_command(capsys, tmp_path):

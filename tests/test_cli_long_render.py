@@ -48,14 +48,33 @@ def start(*arguments, before=""):
     )
 
 
+OWN = """<scene version="3.0.0">
+  <integrator type="path"/>
+  <sensor type="perspective"><transform name="to_world"><lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/><rfilter type="box"/>
+    </film></sensor>
+  <emitter type="constant"/>
+  <shape type="sphere"><bsdf type="sommerl"><string name="filename" value="nickel"/></bsdf></shape>
+</scene>
+"""
+
+
 @pytest.mark.parametrize(
-    ("kind", "before"),
-    [(signal.SIGKILL, ""), (signal.SIGINT, ""), (signal.SIGINT, SCALAR)],
-    ids=["kill", "int", "scalar"],
+    ("kind", "before", "own"),
+    [
+        (signal.SIGKILL, "", False),
+        (signal.SIGINT, "", False),
+        (signal.SIGINT, SCALAR, False),
+        (signal.SIGKILL, "", True),
+        (signal.SIGINT, "", True),
+    ],
+    ids=["kill", "int", "scalar", "kill-own", "int-own"],
 )
-def test_killed_and_started_again_it_goes_on_to_the_same_image(tmp_path, kind, before):
+def test_killed_and_started_again_it_goes_on_to_the_same_image(tmp_path, kind, before, own):
     """Without LLVM, Mitsuba hands over a pass that was interrupted as it is, with a part of its pixels black."""
-    options = "render", "--scene", "statue", "--size", 32, "--spp", 64 if before else 1024, "--json"
+    (tmp_path / "own.xml").write_text(OWN)
+    scene = [tmp_path / "own.xml"] if own else ["--scene", "statue", "--size", 32]
+    options = "render", *scene, "--spp", 64 if before else 1024, "--json"
     whole, path = tmp_path / "whole.exr", tmp_path / "out.exr"
     part = tmp_path / "out.exr.sommerl-part"
     process = start(*options, "-o", path, before=before)

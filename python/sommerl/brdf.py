@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from copy import copy
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +27,9 @@ class Brdf(ABC):
     """An isotropic BRDF. A subclass gives one formula, which runs on NumPy and on Dr.Jit arrays."""
 
     name: str
+    compressed_as: ClassVar[str] = ""  #: the kind of a compressed material; see `origin`
+    file_sha256: str = ""  #: of the file that a compressed material was read from
+    made_from: tuple[Mapping[str, str], ...] = ()  #: what was known of its source; see `origin`
 
     @property
     def facts(self) -> dict[str, Any]:

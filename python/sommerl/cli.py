@@ -13,7 +13,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, NoReturn, get_args
 
-from . import __version__, commands, convert, demo, plots, rendering
+from . import __version__, commands, convert, demo, own_scenes, plots, rendering
 from .errors import OptionError, SommerlError
 from .factored.fit import FactorOptions
 from .fitting.options import MOST_LOBES, FitOptions, Loss, Sampling
@@ -228,16 +228,21 @@ def _compare(add: Any) -> None:
 
 
 def _render(add: Any) -> None:
-    summary = "Renders materials in a scene. PNG is exposed for the objects; EXR is linear."
+    summary = "Renders materials in a scene, or a scene of your own. PNG is exposed for the objects; EXR is linear."
     example = """sommerl render nickel.smrl -o nickel.exr
+  sommerl render kitchen.xml -o kitchen.exr --spp 1024 -D wall=nickel.smrl
   sommerl render --scene statue --mesh buddha.obj blue.smrl --against blue.binary -o blue.png
   sommerl render --scene grid FOLDER --size 128 -o sheet.png"""
     command = _command(add, "render", rendering.render, summary, example)
-    command.epilog = f"{rendering.SCENES}\n\n{rendering.FILES}\n\n{command.epilog}"
+    command.epilog = f"{rendering.SCENES}\n\n{rendering.FILES}\n\n{own_scenes.FILES}\n\n{command.epilog}"
     command.add_argument(
-        "materials", nargs="*", metavar="MATERIAL", help="as many as the scene takes; the rest are the scene's own"
+        "materials",
+        nargs="*",
+        metavar="MATERIAL",
+        help="as many as the scene takes, the rest are the scene's own; or SCENE.xml, a scene of your own",
     )
-    command.add_argument("--scene", choices=[*STAGES, rendering.GRID], default="sphere", help="(%(default)s)")
+    default = rendering.DEFAULTS["scene"]
+    command.add_argument("--scene", choices=[*STAGES, rendering.GRID], help=f"({default})")
     command.add_argument("-o", "--output", type=Path, required=True, help="a .png or .exr file")
     command.add_argument(
         "--against",
@@ -258,10 +263,17 @@ def _render(add: Any) -> None:
     command.add_argument(
         "--sampler",
         choices=[*SAMPLERS],
-        default=OURS.name,
-        help="how directions to the light are drawn; all give the same image, with more or less noise (%(default)s)",
+        help=f"how directions to the light are drawn; all give the same image, with more or less noise ({OURS.name})",
     )
+    command.add_argument(
+        "--variant", metavar="NAME", help="SCENE.xml: of Mitsuba, like scalar_rgb (the fastest there is)"
+    )
+    command.add_argument(
+        "-D", dest="define", action="append", default=[], metavar="NAME=VALUE",
+        help="SCENE.xml: a value for its parameter $NAME; given again: for another one",
+    )  # fmt: skip
     _rendering(command)
+    command.set_defaults(spp=None, size=None)  # so that it is known which are given
 
 
 def _plot(add: Any) -> None:
@@ -380,7 +392,7 @@ def _rendering(command: Any) -> None:
         ("size", DEFAULT_SIZE, "width and height in pixels"),
         ("seed", 0, "of the random numbers"),
     ):
-        command.add_argument(f"--{name}", type=int, default=default, metavar="N", help=f"{text} (%(default)s)")
+        command.add_argument(f"--{name}", type=int, default=default, metavar="N", help=f"{text} ({default})")
     command.add_argument(
         "--envmap", type=Path, metavar="FILE", help="a latitude-longitude image that lights the scene (a built-in one)"
     )

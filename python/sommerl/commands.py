@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 import time
 from argparse import Namespace
+from collections.abc import Generator
+from contextlib import contextmanager
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,7 @@ from .describe import (
     image_rows,
     label,
     lookup,
+    origin_rows,
     print_fits,
     table_rows,
     text,
@@ -37,6 +40,7 @@ from .formats.names import split_member
 from .load import EXTENSIONS, interpolated, load, load_table
 from .metrics import table_metrics
 from .models.multi_lobe import MultiLobe
+from .render.checkpoint import Checkpoint
 from .render.compare import compare_on_sphere, judge_on_sphere
 from .render.environment import default_environment, load_environment
 from .render.images import side_by_side, write_image
@@ -51,6 +55,7 @@ from .table import BrdfTable
 
 SMALLEST_SIZE = 8  # SSIM looks at windows of 7 pixels
 MOST_SPP = 2**20
+HIDDEN = ("facts", "lobes", "made_from", "measured_against")  # keys that `info` shows for people in rows of their own
 
 
 def compress(options: Namespace) -> dict[str, Any]:
@@ -154,13 +159,11 @@ def info(options: Namespace) -> dict[str, Any]:
     on_disk = path.stat().st_size if path.is_file() else None
     result = describe(brdf, on_disk)
     if not options.json:
-        shown = {
-            key: value for key, value in result.items() if value not in (None, "", {}) and key not in ("facts", "lobes")
-        }
+        shown = {key: value for key, value in result.items() if value not in (None, "", {}) and key not in HIDDEN}
         for key in ("bytes_paper", "bytes_memory", "bytes_disk"):
             if key in shown:
                 shown[key] = console.size(shown[key])
-        rows = {key: text(value) for key, value in shown.items()} | fact_rows(result["facts"] or {})
+        rows = {key: text(value) for key, value in shown.items()} | fact_rows(result["facts"] or {}) | origin_rows(brdf)
         if isinstance(brdf, MultiLobe):
             rows |= {f"lobe {number}": str(lobe) for number, lobe in enumerate(brdf.lobes, 1)}
         console.print_rows(str(options.material), rows)
@@ -244,6 +247,7 @@ def factor(options: Namespace) -> dict[str, Any]:
             "size in memory": console.size(material.bytes_memory),
             "size on disk": console.size(written),
             **fact_rows(known["facts"]),
+            **origin_rows(material),
             "time": f"{seconds:.1f} s",
         }
         console.print_rows(f"{material.name} → {options.output}", rows)
@@ -314,13 +318,30 @@ def check_apart(path: Path, *sources: str | Path | None) -> None:
             raise OptionError(f"{path}: expected an output other than the input")
 
 
+def check_range(name: str, value: int, low: int, high: int) -> None:
+    """Raises OptionError for a number out of range."""
+    if not low <= value <= high:
+        raise OptionError(f"{name}: expected {low} to {high}, found {value}")
+
+
 def check_rendering(options: Namespace) -> None:
     """Checks the options that all renderings have."""
     for name, low, high in (("spp", 1, MOST_SPP), ("size", SMALLEST_SIZE, LARGEST_SIZE), ("seed", 0, 2**64 - 1)):
-        if not low <= getattr(options, name) <= high:
-            raise OptionError(f"{name}: expected {low} to {high}, found {getattr(options, name)}")
+        check_range(name, getattr(options, name), low, high)
     if options.envmap and not options.envmap.is_file():
         raise FormatError(f"{options.envmap}: expected an environment image, found no file")
+
+
+@contextmanager
+def goes_on_from(checkpoint: Checkpoint) -> Generator[console.Advance | None]:
+    """A progress bar for a render; if that is interrupted, it is said whether it can go on."""
+    try:
+        with console.progress("rendering") as advance:
+            yield advance
+    except KeyboardInterrupt:
+        if checkpoint.holds:
+            print(f"{checkpoint.path}: from here, the same command goes on", file=sys.stderr)
+        raise
 
 
 def environment_of(options: Namespace) -> Any:

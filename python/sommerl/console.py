@@ -28,6 +28,14 @@ def progress(what: str) -> Generator[Advance | None]:
         yield advance
 
 
+class Warnings(list[str]):
+    """Sentences that were said on standard error."""
+
+    def say(self, sentence: str) -> None:
+        self.append(sentence)
+        print(f"warning: {sentence}", file=sys.stderr)
+
+
 def print_rows(title: str, rows: Mapping[str, str]) -> None:
     """A table of names and values on standard output."""
     from rich.console import Console

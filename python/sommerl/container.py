@@ -11,6 +11,7 @@ All numbers are little-endian.
 
 from __future__ import annotations
 
+import hashlib
 import struct
 import zlib
 from collections.abc import Callable
@@ -56,10 +57,12 @@ def load(path: str | Path, longest: int, decode: Callable[[bytes], Material]) ->
     if length > longest:
         raise FormatError(f"{path}: expected at most {longest} bytes, found {length}")
     try:
-        material = decode(path.read_bytes())
+        data = path.read_bytes()
+        material = decode(data)
     except SommerlError as error:
         raise FormatError(f"{path}: {error}") from error
     material.name = visible(material.name)
+    material.file_sha256 = hashlib.sha256(data).hexdigest()
     return material
 
 

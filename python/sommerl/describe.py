@@ -14,6 +14,7 @@ from .formats.rgl import RglBrdf
 from .metrics import ImageMetrics, table_metrics
 from .models.multi_lobe import MultiLobe
 from .nodes import NodeLattice
+from .origin import FIRST, full_chain
 from .som_man.budget import CompactReport
 from .som_man.material import SomManBrdf
 from .som_man.options import TrainOptions
@@ -59,7 +60,29 @@ def describe(brdf: Brdf, bytes_disk: int | None) -> dict[str, Any]:
         if isinstance(brdf.lattice, NodeLattice):
             known["nodes"] = brdf.lattice.size
     known["source_sha256"] = getattr(brdf, "source_sha256", None)
+    known["made_from"] = [dict(link) for link in full_chain(brdf)] or None
+    known["measured_against"] = _measured_against(brdf)
     return {"kind": kind, "name": brdf.name, **known, "facts": brdf.facts or None, "bytes_disk": bytes_disk}
+
+
+def _measured_against(brdf: Brdf) -> dict[str, str] | None:
+    """What figures of a compressed material are against: what it was made from, directly."""
+    if not brdf.compressed_as:
+        return None
+    source = {"kind": FIRST, "name": brdf.name, "sha256": getattr(brdf, "source_sha256", "")}
+    return dict(next(iter(full_chain(brdf)), source))
+
+
+def origin_rows(brdf: Brdf) -> dict[str, str]:
+    """The chain of what a material was made from, for people; nothing of what was made from its first source."""
+    chain = full_chain(brdf)
+    if not chain:
+        return {}
+    links = [f"{link['name']}, {link['kind']}, {link['sha256'][:12] or 'no file'}" for link in chain]
+    rows = {"made from": " ← ".join(links)}
+    if isinstance(brdf, SomManBrdf):
+        rows["figures are against"] = f"{chain[0]['name']}: a compressed material, not a measurement"
+    return rows
 
 
 def label(brdf: Brdf) -> str:
@@ -121,7 +144,7 @@ def compression_rows(material: SomManBrdf, bytes_disk: int, report: TrainReport)
     }
     if report.cells_clamped:
         rows["cells clamped to 0"] = str(report.cells_clamped)
-    return rows | fact_rows(material.facts) | {"training": f"{report.seconds:.1f} s"}
+    return rows | origin_rows(material) | fact_rows(material.facts) | {"training": f"{report.seconds:.1f} s"}
 
 
 def compact_rows(material: SomManBrdf, bytes_disk: int, report: CompactReport) -> dict[str, str]:
@@ -133,7 +156,7 @@ def compact_rows(material: SomManBrdf, bytes_disk: int, report: CompactReport) -
         "size in memory": console.size(material.bytes_memory),
         "size on disk": console.size(bytes_disk),
     }
-    return rows | {"time": f"{report.seconds:.1f} s"}
+    return rows | origin_rows(material) | {"time": f"{report.seconds:.1f} s"}
 
 
 def table_rows(metrics: Mapping[str, float]) -> dict[str, str]:

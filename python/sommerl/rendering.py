@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 import time
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Sequence
@@ -16,9 +15,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import console
+from . import console, own_scenes
 from .brdf import Brdf
-from .commands import alike, check_apart, check_output, check_rendering, environment_of, stem, table_distance
+from .commands import (
+    alike,
+    check_apart,
+    check_output,
+    check_rendering,
+    environment_of,
+    goes_on_from,
+    stem,
+    table_distance,
+)
+from .console import Warnings
 from .describe import image_rows, label, table_rows
 from .errors import MaterialError, OptionError, SommerlError
 from .load import EXTENSIONS, interpolated, load
@@ -29,12 +38,13 @@ from .render.compare import Comparison
 from .render.images import DIFFERENCE_GAIN, captioned, signed_difference, tiled, write_image
 from .render.llvm import mitsuba
 from .render.meshes import Mesh, load_mesh
-from .render.passes import Scene, render_all
+from .render.passes import DEFAULT_SIZE, DEFAULT_SPP, Scene, render_all
 from .render.scenes import STAGES, stage
 from .sampling import named
 from .sampling.sampler import Sampler
 
 GRID = "grid"
+DEFAULTS = {"scene": "sphere", "spp": DEFAULT_SPP, "size": DEFAULT_SIZE, "sampler": named.OURS.name}
 MOST_PIXELS = 2**26  # of a sheet
 MOST_COMPARED = 2**23  # of one that is compared: the metrics take some 260 bytes for each
 WIDEST = 2048  # pixels that the four pictures of a comparison may take in one row
@@ -97,12 +107,17 @@ class Setting:
 
 
 def render(options: Namespace) -> dict[str, Any]:
-    warnings: list[str] = []
+    scene = own_scenes.scene_of(options)
+    if scene:
+        return own_scenes.render(scene, options)
+    chosen = {name: value for name, value in vars(options).items() if value is not None}
+    return _render(Namespace(**(vars(options) | DEFAULTS | chosen)))
 
-    def warn(sentence: str) -> None:
-        warnings.append(sentence)
-        print(f"warning: {sentence}", file=sys.stderr)
 
+def _render(options: Namespace) -> dict[str, Any]:
+    """Renders one of the scenes that come along."""
+    warnings = Warnings()
+    warn = warnings.say
     check_rendering(options)
     pairs = _pairs(options)
     outputs = _outputs(options, pairs)
@@ -145,7 +160,7 @@ def render(options: Namespace) -> dict[str, Any]:
         print(f"{shown} → {options.output} ({seconds:.1f} s)")
         if rows:
             console.print_rows(f"{result['candidate']} against {result['reference']}", rows)
-    return result | {"warnings": warnings}
+    return result | {"warnings": list(warnings)}
 
 
 def _outputs(options: Namespace, pairs: Sequence[Pair]) -> dict[str, Path]:
@@ -265,13 +280,8 @@ def _rendered(
     makers: list[Callable[[], Scene]] = []
     for frame, twice in zip(frames, compared, strict=True):
         makers += [partial(make, frame, which) for which in ((0, 1) if twice else (1,))]
-    try:
-        with console.progress("rendering") as advance:
-            images = render_all(makers, spp=options.spp, seed=options.seed, progress=advance, checkpoint=checkpoint)
-    except KeyboardInterrupt:
-        if checkpoint.holds:
-            print(f"{checkpoint.path}: from here, the same command goes on", file=sys.stderr)
-        raise
+    with goes_on_from(checkpoint) as advance:
+        images = render_all(makers, spp=options.spp, seed=options.seed, progress=advance, checkpoint=checkpoint)
     rest = iter(images)
     references: list[Image] = []
     candidates: list[Image] = []

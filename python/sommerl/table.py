@@ -15,6 +15,7 @@ from .brdf import Brdf, Buffers, OnLattice
 from .errors import MaterialError
 from .half_diff import directions
 from .lattice import MERL, Interpolation, Lattice, checked
+from .origin import source_of
 
 
 class BrdfTable(OnLattice):
@@ -75,7 +76,8 @@ class BrdfTable(OnLattice):
             return brdf
         table = cls.sample(brdf, (brdf.grid if isinstance(brdf, OnLattice) else None) or MERL)
         table.source_facts = brdf.facts
-        table.source_sha256 = getattr(brdf, "source_sha256", table.source_sha256)
+        sha256, table.made_from = source_of(brdf)
+        table.source_sha256 = sha256 or table.source_sha256
         return table
 
     @property

@@ -1,14 +1,17 @@
 import json
+import os
+import re
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import pytest
-from helpers import lambertian_table
+from helpers import check_sentence, complaint, lambertian_table, must_fail
 
 from sommerl import TrainOptions, save, train
 from sommerl.errors import FormatError
 from sommerl.formats import scene
 from sommerl.models.nbrdf import WEIGHTS
-from sommerl.render.bsdf import register
+from sommerl.render.bsdf import register, snippet
 from sommerl.render.llvm import mitsuba
 
 SCENE = """<scene version="3.0.0">
@@ -39,38 +42,121 @@ def test_xml(folder):
     assert image.mean() == pytest.approx(0.5, rel=0.02)
 
 
-def test_json(folder):
-    scene.write(folder / "grey & white.smrl", folder / "grey.json")
+def check_place(path, expected):
+    assert json.loads(path.read_text())["filename"] == expected
+
+
+def test_both_snippets_name_the_same_place(folder):
+    """Relative to the snippet, also where that lies behind a link."""
+    (folder / "link").symlink_to(folder / "snippets" / "deep")
+    (folder / "snippets" / "deep").mkdir()
+    for where, expected in (
+        ("", "grey & white.smrl"),
+        ("snippets", "../grey & white.smrl"),
+        ("link", "../../grey & white.smrl"),
+    ):
+        for extension in ("xml", "json"):
+            scene.write(folder / "grey & white.smrl", folder / where / f"grey.{extension}")
+        check_place(folder / where / "grey.json", expected)
+        must_fail(check_place, folder / where / "grey.json", str(folder / "grey & white.smrl"))
+        assert f"value={quoteattr(expected)}" in (folder / where / "grey.xml").read_text()
+        mitsuba()
+        register()
+        assert "lambertian" in str(mitsuba().load_dict(snippet(folder / where / "grey.json")))
+
+
+NAMES = ["a b", "q\"u'o", "am&p", "da--sh", "ä日", "do.t", "co:lon", "<x>", "tab\tnl\n", "back\\slash", "-x", "nickel"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_of_every_kind_from_another_folder(folder, tmp_path, monkeypatch, name):
+    """The material, the folder and the snippet have it."""
+    (folder / name).mkdir()
+    material = folder / name / f"{name}.smrl"
+    material.write_bytes((folder / "grey & white.smrl").read_bytes())
+    for extension in ("xml", "json"):
+        scene.write(material, folder / "snippets" / f"{name}.{extension}")
+    monkeypatch.chdir("/")
     mi = mitsuba()
     register()
-    bsdf = mi.load_dict(json.loads((folder / "grey.json").read_text()))
-    assert "lambertian" in str(bsdf)
+    assert "lambertian" in str(mi.load_dict(snippet(folder / "snippets" / f"{name}.json")))
+    # As the head of the XML says.
+    head = (folder / "snippets" / f"{name}.xml").read_text()
+    include, id_ = re.search(r"<include filename=(.*)/>, and <ref id=(.*)/> in", head, re.DOTALL).groups()
+    text = SCENE.replace('"grey.xml"', include).replace('"grey"', id_)
+    (folder / "snippets" / "scene.xml").write_text(text)
+    shapes = mi.load_file(str(folder / "snippets" / "scene.xml")).shapes()
+    assert any("lambertian" in str(shape.bsdf()) for shape in shapes)
+
+
+def test_json_by_the_resolver(folder):
+    """Without our function, Mitsuba's own way of finding files serves."""
+    scene.write(folder / "grey & white.smrl", folder / "snippets" / "grey.json")
+    found = json.loads((folder / "snippets" / "grey.json").read_text())
+    assert "snippet('grey.json')" in found["comment"]
+    mi = mitsuba()
+    register()
+    with pytest.raises(RuntimeError, match="found none"):
+        mi.load_dict(found)
+    before = mi.file_resolver()
+    mi.set_file_resolver(mi.FileResolver(before))
+    mi.file_resolver().append(str(folder / "snippets"))
+    try:
+        assert "lambertian" in str(mi.load_dict(found))
+    finally:
+        mi.set_file_resolver(before)
 
 
 def test_a_member_of_an_archive(tmp_path, monkeypatch):
     np.savez(tmp_path / "all.npz", nickel=np.zeros(WEIGHTS), chrome=np.zeros(WEIGHTS))
     (tmp_path / "sub").mkdir()
     monkeypatch.chdir(tmp_path)
-    scene.write("all.npz:nickel", tmp_path / "sub" / "x.json")
-    found = json.loads((tmp_path / "sub" / "x.json").read_text())
-    assert found["filename"] == f"{tmp_path}/all.npz:nickel"
-    scene.write("all.npz:nickel", tmp_path / "sub" / "x--y.xml")
+    for name in ("x.json", "x--y.xml"):
+        scene.write("all.npz:nickel", tmp_path / "sub" / name)
+    check_place(tmp_path / "sub" / "x.json", "../all.npz:nickel")
     assert 'value="../all.npz:nickel"' in (tmp_path / "sub" / "x--y.xml").read_text()
     mi = mitsuba()
     register()
-    mi.file_resolver().prepend(str(tmp_path / "sub"))
-    assert "nickel (NBRDF)" in str(mi.load_dict(found | {"filename": "../all.npz:nickel"}))
-    mi.load_file(str(tmp_path / "sub" / "x--y.xml"))
+    monkeypatch.chdir("/")
+    found = snippet(tmp_path / "sub" / "x.json")
+    assert found["filename"].endswith("all.npz:nickel")
     assert "nickel (NBRDF)" in str(mi.load_dict(found))
+    mi.load_file(str(tmp_path / "sub" / "x--y.xml"))
 
 
-def test_a_dollar_sign(tmp_path):
-    (tmp_path / "pri$ce.smrl").write_bytes(b"")
-    with pytest.raises(FormatError, match=r"without \$ in its name"):
-        scene.write(tmp_path / "pri$ce.smrl", tmp_path / "x.xml")
-    scene.write(tmp_path / "pri$ce.smrl", tmp_path / "x.json")
+@pytest.mark.parametrize("name", ["pri$ce", "a\x01b"])
+def test_what_xml_cannot_hold(tmp_path, name):
+    for material, path in ((tmp_path / f"{name}.smrl", tmp_path / "x.xml"), ("nickel", tmp_path / f"{name}.xml")):
+        (tmp_path / f"{name}.smrl").write_bytes(b"")
+        with pytest.raises(FormatError, match=r"without \$ and control characters"):
+            scene.write(material, path)
+        assert not path.exists()
+        scene.write(material, path.with_suffix(".json"))
+
+
+def test_names_that_are_no_text(tmp_path):
+    name = os.fsdecode(b"\xff.smrl")
+    (tmp_path / name).write_bytes(b"")
+    for extension in ("xml", "json"):
+        with pytest.raises(FormatError, match=r"expected names in UTF-8, found .\.smrl"):
+            scene.write(tmp_path / name, tmp_path / f"x.{extension}")
 
 
 def test_a_built_in_is_named(tmp_path):
     scene.write("nickel", tmp_path / "x.json")
-    assert json.loads((tmp_path / "x.json").read_text()) == {"type": "sommerl", "filename": "nickel"}
+    check_place(tmp_path / "x.json", "nickel")
+    assert snippet(tmp_path / "x.json")["filename"] == "nickel"
+    register()
+    assert "nickel" in str(mitsuba().load_dict(snippet(tmp_path / "x.json")))
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{", '{"filename": 3}', '{"type": "sommerl"}', "[" * 40000, "\x00", " " * 70000, None]
+)
+def test_what_is_no_snippet(tmp_path, text):
+    path = tmp_path / "x.json"
+    if text is not None:
+        path.write_text(text)
+    message = complaint(snippet, path)
+    assert message
+    check_sentence(message, str(path))

@@ -15,7 +15,7 @@ from sommerl.render.llvm import drjit, mitsuba, usable_variants
 from sommerl.sampling.named import SAMPLERS, fitted
 
 mi, dr = mitsuba(), drjit()
-VARIANTS = [variant for variant in usable_variants() if not variant.startswith("cuda")]
+VARIANTS = usable_variants()
 JIT = [variant for variant in VARIANTS if variant.startswith("llvm")]
 SCALAR = [variant for variant in VARIANTS if variant.startswith("scalar")]
 LUMINANCE = np.array([0.212671, 0.715160, 0.072169])

@@ -13,6 +13,7 @@ from ..brdf import Brdf
 from ..errors import OptionError
 from ..half_diff import spherical
 from ..optional import optional
+from ..origin import source_of
 from .material import COLUMNS, ELEVATIONS, LEAST_COSINE, MOST, MOST_TERMS, PI, ROWS, FactoredBrdf
 
 FIRST_ITERATIONS, ITERATIONS = 200, 100
@@ -60,8 +61,10 @@ def factor(brdf: Brdf, options: FactorOptions | None = None, *, progress: Progre
     f, u, v = (part / np.where(top > 0, top, 1.0) for part, top in zip((f, u, v), tops, strict=True))
     by_lobe = np.moveaxis(f.reshape(ELEVATIONS, 3, -1), 1, 2)
     scale = tops[0][:, None] * tops[1] * tops[2]
-    sha256 = getattr(brdf, "source_sha256", None) or ""
-    return FactoredBrdf(by_lobe, u, v, scale, name=brdf.name, source_sha256=sha256)
+    sha256, made_from = source_of(brdf)
+    material = FactoredBrdf(by_lobe, u, v, scale, name=brdf.name, source_sha256=sha256)
+    material.made_from = made_from
+    return material
 
 
 def _light(brdf: Brdf) -> tuple[Matrix, NDArray[np.bool_]]:

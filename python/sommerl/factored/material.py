@@ -39,6 +39,8 @@ class FactoredBrdf(Brdf):
     scale: a factor for each term [1/sr], (J, K).
     """
 
+    compressed_as = "factored"
+
     def __init__(
         self,
         lobes: NDArray[Any],

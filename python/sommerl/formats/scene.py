@@ -4,48 +4,92 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from pathlib import Path
+from typing import Any, cast
 from xml.sax.saxutils import quoteattr
 
 from ..errors import FormatError
-from ..files import atomic_write
-from .names import split_member
+from ..files import atomic_write, visible
+from .names import printable, split_member
 
 HEAD = """\
-<!-- Before a scene with this file in it is loaded, in Python:
+<!-- The file's name is relative to this file. A scene with this file in it: sommerl render scene.xml -o scene.exr
+     In Python, before it is loaded:
        from sommerl.render.llvm import mitsuba; from sommerl.render.bsdf import register
        mi = mitsuba(); register(); scene = mi.load_file("scene.xml")
      In the scene, a file in this folder: <include filename={include}/>, and <ref id={id}/> in each shape. -->
 """
+COMMENT = (
+    "The file's name is relative to this file. In Python: from sommerl.render.llvm import mitsuba; from "
+    "sommerl.render.bsdf import register, snippet; mi = mitsuba(); register(); bsdf = mi.load_dict(snippet({path}))"
+)
+CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")  # which no XML file may have
+LONGEST = 2**16  # bytes of a .json
 
 
 def write(material: str | Path, path: str | Path) -> None:
-    """Writes a snippet for a material: a file or a built-in.
+    """Writes a snippet for a material: a file, whose place is given relative to the snippet's, or a built-in.
 
-    The file's place is given relative to the snippet's in .xml, and absolute in .json: a dictionary has no place.
-
-    Raises FormatError for a name that Mitsuba's XML cannot hold.
+    Raises FormatError for a name that the snippet cannot hold.
     """
     path = Path(path)
+    xml = path.suffix.lower() == ".xml"
     file, member = split_member(material)
     name = str(material)
     if file.is_file():
-        place = file.resolve() if path.suffix.lower() == ".json" else Path(os.path.relpath(file, path.parent))
-        name = place.as_posix() + (f":{member}" if member else "")
-    if "$" in name and path.suffix.lower() != ".json":
-        raise FormatError(
-            f"{path}: expected a material without $ in its name, which Mitsuba's XML takes for a "
-            f"parameter, found {name}; .json takes it"
-        )
-    if path.suffix.lower() == ".json":
-        text = json.dumps({"type": "sommerl", "filename": name}, indent=2) + "\n"
-    else:
-        # No two hyphens in a comment.
-        quoted = [quoteattr(text).replace("--", "-&#45;") for text in (path.name, path.stem)]
-        head = HEAD.format(include=quoted[0], id=quoted[1])
-        text = (
-            f'<scene version="3.0.0">\n{head}    <bsdf type="sommerl" id={quoteattr(path.stem)}>\n'
-            f'        <string name="filename" value={quoteattr(name)}/>\n    </bsdf>\n</scene>\n'
-        )
+        # Where the folders really are: from behind a link, ".." leads elsewhere.
+        place = os.path.relpath(Path(os.path.realpath(file.parent)) / file.name, os.path.realpath(path.parent))
+        name = Path(place).as_posix() + (f":{member}" if member else "")
+    for text in (name, path.stem) if xml else ():
+        if "$" in text or CONTROLS.search(text):
+            raise FormatError(
+                f"{path}: expected names without $ and control characters, which Mitsuba's XML cannot hold, found "
+                f"{visible(text)}; .json can"
+            )
+    text = _xml(name, path) if xml else _json(name, path)
+    try:
+        data = text.encode()
+    except UnicodeEncodeError as error:
+        raise FormatError(f"{path}: expected names in UTF-8, found {printable(name)}") from error
     with atomic_write(path) as out:
-        out.write(text.encode())
+        out.write(data)
+
+
+def _xml(name: str, path: Path) -> str:
+    # No two hyphens in a comment.
+    quoted = [quoteattr(text).replace("--", "-&#45;") for text in (path.name, path.stem)]
+    head = HEAD.format(include=quoted[0], id=quoted[1])
+    return (
+        f'<scene version="3.0.0">\n{head}    <bsdf type="sommerl" id={quoteattr(path.stem)}>\n'
+        f'        <string name="filename" value={quoteattr(name)}/>\n    </bsdf>\n</scene>\n'
+    )
+
+
+def _json(name: str, path: Path) -> str:
+    comment = COMMENT.format(path=repr(path.name))
+    found = {"comment": comment, "type": "sommerl", "filename": name}
+    return json.dumps(found, indent=2, ensure_ascii=False) + "\n"
+
+
+def read(path: str | Path) -> dict[str, Any]:
+    """The dictionary in a .json snippet, with the file's place from where `path` is.
+
+    Raises FormatError if it is none.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FormatError(f"{path}: expected a snippet, found no file")
+    with path.open("rb") as file:
+        data = file.read(LONGEST + 1)
+    try:
+        found = json.loads(data)
+    except (ValueError, RecursionError) as error:
+        raise FormatError(f"{path}: expected JSON, found something else ({error})") from error
+    snippet = cast("dict[str, Any]", found) if isinstance(found, dict) else {}
+    if not isinstance(snippet.get("filename"), str):
+        raise FormatError(f"{path}: expected a snippet with a filename, found something else")
+    file, member = split_member(path.parent / snippet["filename"])
+    if file.is_file():
+        snippet["filename"] = str(file) + (f":{member}" if member else "")
+    return snippet

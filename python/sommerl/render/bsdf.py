@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..arrays import Packed16, Triple
 from ..brdf import Brdf
 from ..errors import OptionError
+from ..formats import scene
 from ..load import interpolated, load
 from ..sampling import named
 from ..sampling.half_vector import albedo_at, albedos
@@ -38,13 +39,22 @@ def register() -> None:
 
     Properties: `filename`, a built-in's name or a path, which may be relative to the scene file; `interpolation`,
     nearest or trilinear, if it is not to be the material's own; `sampler`, one of the names in `sampling.named`, if it
-    is not to be ours; `tint`, a colour or texture from 0 to 1, and `scale`, a number, which f_r is multiplied by.
+    is not to be ours; `tint`, a colour or texture from 0 to 1, and `scale`, a number, which f_r is multiplied by;
+    `comment`, which is for people.
     """
     mitsuba().register_bsdf("sommerl", _from_properties)
 
 
+def snippet(path: str | Path) -> dict[str, Any]:
+    """A material's dictionary, for `load_dict` after `register`, from a .json that `sommerl convert` wrote: the place
+    of the material, in the file relative to the file, is made absolute. Raises FormatError if it is no such file."""
+    return scene.read(Path(path).absolute())
+
+
 def _from_properties(props: Any) -> Any:
     name = str(props["filename"])
+    if "comment" in props:
+        props.mark_queried("comment")  # Mitsuba refuses what nobody reads
     # Of "FILE:MEMBER", only the file is to be found; a colon may also be part of its name.
     resolve = mitsuba().file_resolver().resolve
     places = [(name, "")] + [(name[:at], name[at:]) for at, character in enumerate(name) if character == ":"]

@@ -39,8 +39,10 @@ def mitsuba(variant: str | None = None) -> Any:
 
 
 def usable_variants() -> list[str]:
-    """The variants of the Mitsuba that is installed which this package works in."""
-    return [variant for variant in _module().variants() if USABLE.fullmatch(variant)]
+    """The variants that this package works in, of those that are installed and this machine can run."""
+    dr = jit.drjit()
+    runs = {"scalar": True, "llvm": jit.has_llvm(dr), "cuda": dr.has_backend(dr.JitBackend.CUDA)}
+    return [name for name in _module().variants() if USABLE.fullmatch(name) and runs[name.split("_")[0]]]
 
 
 @cache

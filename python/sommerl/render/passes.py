@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -50,9 +50,7 @@ def render_all(
     is written every few seconds and when Python is interrupted; and is left for the caller to remove.
     """
     mi = mitsuba()
-    identity = {"spp": str(spp), "seed": str(seed), "variant": mi.variant(), "size of passes": str(SAMPLES_A_PASS)}
-    identity |= {"version of Sommerl": __version__, "version of Mitsuba": mi.__version__}
-    state = checkpoint.load(identity) if checkpoint else State()
+    state = checkpoint.load(_identity(spp, seed)) if checkpoint else State()
     try:
         for make in scenes[len(state.images) :]:
             with undisturbed():
@@ -60,18 +58,14 @@ def render_all(
             width, height = (int(n) for n in scene.mitsuba.sensors()[0].film().size())
             passes = _passes(spp, width * height)
             before, of_all = len(state.images) * len(passes), len(scenes) * len(passes)
-            if progress and state.passes:
-                progress(before + state.passes, of_all)
-            for number in range(state.passes, len(passes)):
-                with undisturbed():
-                    pixels = np.array(mi.render(scene.mitsuba, spp=passes[number], seed=_seed(seed, number)))
-                # Not reached after an interruption: of the pass that it came in, Mitsuba may have left out a part.
-                total = passes[number] * pixels.astype(np.float64)
-                state = State(state.images, total if state.total is None else state.total + total, number + 1)
-                if checkpoint:
-                    checkpoint.save(state)
+
+            def one(samples: int, number: int, scene: Scene = scene) -> NDArray[np.float64]:
+                return samples * np.array(mi.render(scene.mitsuba, spp=samples, seed=number), np.float64)
+
+            reached = _after_each(state, passes, seed, one, checkpoint)
+            for state in reached:
                 if progress:
-                    progress(before + number + 1, of_all)
+                    progress(before + state.passes, of_all)
             assert state.total is not None
             with undisturbed():
                 image = Image((state.total / spp).astype(np.float32), _mask(scene, width, height))
@@ -81,6 +75,61 @@ def render_all(
             checkpoint.save(state, now=True)
         raise
     return list(state.images)
+
+
+def sum_of_passes(
+    one: Callable[[int, int], NDArray[np.float64]],
+    *,
+    spp: int,
+    seed: int,
+    pixels: int,
+    progress: Progress | None = None,
+    checkpoint: Checkpoint | None = None,
+) -> NDArray[np.float64]:
+    """The sum of what `one(samples a pixel, seed)` gives for each pass of an image of so many pixels.
+
+    It is resumed as `render_all` is.
+    """
+    passes = _passes(spp, pixels)
+    state = checkpoint.load(_identity(spp, seed)) if checkpoint else State()
+    try:
+        reached = _after_each(state, passes, seed, one, checkpoint)
+        for state in reached:
+            if progress:
+                progress(state.passes, len(passes))
+    except KeyboardInterrupt:
+        if checkpoint and state.passes:
+            checkpoint.save(state, now=True)
+        raise
+    assert state.total is not None
+    return state.total
+
+
+def _identity(spp: int, seed: int) -> dict[str, str]:
+    """What decides the pixels of every render."""
+    mi = mitsuba()
+    identity = {"spp": str(spp), "seed": str(seed), "variant": mi.variant(), "size of passes": str(SAMPLES_A_PASS)}
+    return identity | {"version of Sommerl": __version__, "version of Mitsuba": mi.__version__}
+
+
+def _after_each(
+    state: State,
+    passes: Sequence[int],
+    seed: int,
+    one: Callable[[int, int], NDArray[np.float64]],
+    checkpoint: Checkpoint | None,
+) -> Iterator[State]:
+    """The state that a render has reached: where it goes on from, if that is not the beginning, and after each pass."""
+    if state.passes:
+        yield state
+    for number in range(state.passes, len(passes)):
+        with undisturbed():
+            total = one(passes[number], _seed(seed, number))
+        # Not reached after an interruption: of the pass that it came in, Mitsuba may have left out a part.
+        state = State(state.images, total if state.total is None else state.total + total, number + 1)
+        if checkpoint:
+            checkpoint.save(state)
+        yield state
 
 
 def _passes(spp: int, pixels: int) -> list[int]:

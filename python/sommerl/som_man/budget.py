@@ -17,6 +17,7 @@ import numpy as np
 
 from ..brdf import Brdf
 from ..errors import MaterialError, OptionError
+from ..origin import source_of
 from . import file
 from .codes import gain_values, shape_values
 from .fit import LARGEST, SMALLEST, Fitter
@@ -107,7 +108,7 @@ class Compressor:
         self.tried: list[tuple[int, int, float]] = []
         self._brdf, self._seed, self._quality = brdf, seed, quality
         self._step = step or (lambda: None)
-        self._sha256: str = getattr(brdf, "source_sha256", "")
+        self._sha256, self._made_from = source_of(brdf)
         self._fitter = Fitter(brdf, seed=seed)
         self._step()
 
@@ -149,7 +150,7 @@ class Compressor:
         nodes = int(np.clip(spread * usual_nodes(size), SMALLEST, LARGEST))
         problem = self._fitter.problem(nodes)
         gains, shapes = (min(MOST_ENTRIES, round(share * math.sqrt(nodes))) for share in (GAINS, SHAPES))
-        head = file.head_bytes(self._brdf.name, self._sha256)
+        head = file.head_bytes(self._brdf.name, self._sha256, self._made_from)
         if size < 2 * head:
             expected = f"a size of at least {2 * head} bytes, twice what its name and source take"
             raise MaterialError(f"{self._brdf.name}: expected {expected}, found {size}")
@@ -163,6 +164,7 @@ class Compressor:
             scale=self._fitter.scale,
             name=self._brdf.name,
             source_sha256=self._sha256,
+            made_from=self._made_from,
         )
         error = problem.error + problem.excess(found.values())
         # Rounded, so that the last bits of a machine's sums do not decide.

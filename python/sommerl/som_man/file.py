@@ -19,6 +19,7 @@ from __future__ import annotations
 import json
 import struct
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -31,6 +32,7 @@ from ..errors import FormatError, SommerlError
 from ..files import atomic_write
 from ..lattice import INTERPOLATIONS, Lattice
 from ..nodes import NodeLattice
+from ..origin import Link, check_chain
 from .codes import coordinates, gain_codes, gain_values, shape_codes, shape_values
 from .material import SomManBrdf
 
@@ -66,17 +68,17 @@ def load(path: str | Path) -> SomManBrdf:
 
 def encode(material: SomManBrdf) -> bytes:
     """The bytes of a material file. The same material always gives the same bytes."""
-    known = {key: value for key, value in (("metrics", material.metrics), ("options", material.options)) if value}
-    notes = _json(known) if known else b""
+    notes = _notes(made_from=list(material.made_from), metrics=material.metrics, options=material.options)
     nodes = isinstance(material.lattice, NodeLattice)
     body = _head(NODES if nodes else CELLS, material.name, material.source_sha256, notes)
     body += _nodes(material) if nodes else _cells(material)
     return container.sealed(MAGIC, VERSION, body)
 
 
-def head_bytes(name: str, source_sha256: str) -> int:
+def head_bytes(name: str, source_sha256: str, made_from: Sequence[Link]) -> int:
     """What a file of nodes holds before the stream [bytes]."""
-    return container.PREFIX.size + len(_head(NODES, name, source_sha256, b"")) + NODES_HEAD.size
+    head = _head(NODES, name, source_sha256, _notes(made_from=list(made_from)))
+    return container.PREFIX.size + len(head) + NODES_HEAD.size
 
 
 def _head(kind: int, name: str, source_sha256: str, notes: bytes) -> bytes:
@@ -85,7 +87,11 @@ def _head(kind: int, name: str, source_sha256: str, notes: bytes) -> bytes:
     return BYTE.pack(kind) + container.origin(name, source_sha256) + SHORT.pack(len(notes)) + notes
 
 
-def _json(notes: dict[str, Any]) -> bytes:
+def _notes(**known: Any) -> bytes:
+    """What there is to say."""
+    notes = {key: value for key, value in known.items() if value}
+    if not notes:
+        return b""
     try:
         return json.dumps(notes, sort_keys=True, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
     except ValueError as error:
@@ -110,6 +116,7 @@ def _material(reader: Reader) -> SomManBrdf:
     known: dict[str, Any] = reader.origin()
     notes = _object(json.loads(reader.take(*reader.unpack(SHORT)).decode() or "{}", parse_constant=_finite))
     known |= {key: _object(notes.get(key, {})) for key in ("options", "metrics")}
+    known["made_from"] = check_chain(notes["made_from"]) if "made_from" in notes else ()
     return _from_nodes(reader, known) if kind == NODES else _from_cells(reader, known)
 
 

@@ -27,10 +27,13 @@ class SomManBrdf(OnLattice):
     index: unsigned, of the lattice's shape, or (nodes,): the LUT entry of each cell or node. Below the horizon it is
         not used.
     gains, gain_index: (G,) and (nodes,), with a NodeLattice alone. scale: of the cube-root domain.
-    name, options, metrics, source_sha256: what was compressed, how, and how well.
+    name, options, metrics, source_sha256: what was compressed, how, and how well. made_from: what that was made from,
+        if it was a compressed material itself; see `origin`.
 
     Raises MaterialError if shapes do not fit or an index lies outside the LUT.
     """
+
+    compressed_as = "som-man"
 
     def __init__(
         self,
@@ -46,6 +49,7 @@ class SomManBrdf(OnLattice):
         options: Mapping[str, Any] | None = None,
         metrics: Mapping[str, Any] | None = None,
         source_sha256: str = "",
+        made_from: tuple[Mapping[str, str], ...] = (),
     ) -> None:
         self.name = name
         self.lut = np.array(lut, np.float64)
@@ -56,6 +60,7 @@ class SomManBrdf(OnLattice):
         self.options = dict(options or {})
         self.metrics = dict(metrics or {})
         self.source_sha256 = source_sha256
+        self.made_from = made_from
         if self.lut.ndim != 2 or self.lut.shape[1] != 3 or not 1 <= len(self.lut) <= 2**16:
             raise MaterialError(f"{name}: expected a LUT of shape (1 to 65536, 3), found {self.lut.shape}")
         if not np.isfinite(self.lut).all():

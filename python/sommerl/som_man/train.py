@@ -67,7 +67,13 @@ def train(
     palette = kernels.Palette(x[cells])
     index[above] = np.concatenate([palette.query(x[start:stop]) for start, stop in _calls(len(x), len(cells))])
     material = SomManBrdf(
-        rgb[cells], index, table.lattice, name=table.name, options=asdict(options), source_sha256=table.source_sha256
+        rgb[cells],
+        index,
+        table.lattice,
+        name=table.name,
+        options=asdict(options),
+        source_sha256=table.source_sha256,
+        made_from=table.made_from,
     )
     dropped = options.clusters - len(cells)
     return material, TrainReport(errors, dropped, table.cells_clamped, time.perf_counter() - started)
