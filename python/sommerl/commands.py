@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from argparse import Namespace
 from dataclasses import asdict, fields
@@ -69,7 +68,7 @@ def compress(options: Namespace) -> dict[str, Any]:
             if len(options.inputs) == 1:
                 raise
             failed += 1
-            print(f"error: {error}", file=sys.stderr)
+            console.tell(f"error: {error}")
     if failed:
         raise MaterialError(f"inputs: expected to compress {len(options.inputs)} materials, found {failed} that failed")
     return results[0] if len(results) == 1 else {"materials": results}

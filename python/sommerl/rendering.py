@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 import time
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Sequence
@@ -101,7 +100,7 @@ def render(options: Namespace) -> dict[str, Any]:
 
     def warn(sentence: str) -> None:
         warnings.append(sentence)
-        print(f"warning: {sentence}", file=sys.stderr)
+        console.tell(f"warning: {sentence}")
 
     check_rendering(options)
     pairs = _pairs(options)
@@ -114,7 +113,7 @@ def render(options: Namespace) -> dict[str, Any]:
         identity["environment"] = content(setting.environment)
     if setting.mesh:
         identity["mesh"] = content(setting.mesh.positions, setting.mesh.faces, setting.mesh.normals)
-    checkpoint = Checkpoint(checkpoint_of(options.output), identity, warn)
+    checkpoint = Checkpoint(checkpoint_of(options.output), identity, (options.size, options.size), warn)
     started = time.perf_counter()
     candidates, references = _rendered(options, pairs, materials, setting, checkpoint)
     seconds = time.perf_counter() - started
@@ -270,7 +269,7 @@ def _rendered(
             images = render_all(makers, spp=options.spp, seed=options.seed, progress=advance, checkpoint=checkpoint)
     except KeyboardInterrupt:
         if checkpoint.holds:
-            print(f"{checkpoint.path}: from here, the same command goes on", file=sys.stderr)
+            console.tell(f"{checkpoint.path}: from here, the same command goes on")
         raise
     rest = iter(images)
     references: list[Image] = []

@@ -12,7 +12,7 @@ from ..files import atomic_write
 from .names import split_member
 
 HEAD = """\
-<!-- Before a scene with this file in it is loaded, in Python:
+<!-- Written by Sommerl. Before a scene with this file in it is loaded, in Python:
        from sommerl.render.llvm import mitsuba; from sommerl.render.bsdf import register
        mi = mitsuba(); register(); scene = mi.load_file("scene.xml")
      In the scene, a file in this folder: <include filename={include}/>, and <ref id={id}/> in each shape. -->

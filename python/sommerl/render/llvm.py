@@ -35,8 +35,8 @@ def mitsuba() -> Any:
 def _module() -> Any:
     if importlib.util.find_spec("mitsuba") is None:
         raise MissingDependencyError("rendering needs Mitsuba: install sommerl[render]")
-    jit.choose_llvm()
     with undisturbed():
+        jit.choose_llvm()
         return importlib.import_module("mitsuba")
 
 

@@ -52,7 +52,7 @@ def render_all(
     mi = mitsuba()
     identity = {"spp": str(spp), "seed": str(seed), "variant": mi.variant(), "size of passes": str(SAMPLES_A_PASS)}
     identity |= {"version of Sommerl": __version__, "version of Mitsuba": mi.__version__}
-    state = checkpoint.load(identity) if checkpoint else State()
+    state = checkpoint.load(identity, len(scenes), len(_passes(spp, checkpoint.pixels))) if checkpoint else State()
     try:
         for make in scenes[len(state.images) :]:
             with undisturbed():
