@@ -29,7 +29,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 SIGNALS = signal.SIGTERM, signal.SIGINT, signal.SIGKILL
-LONGEST = 300  # seconds that a command may take
+LONGEST = 900  # seconds that a command may take
 CHECKPOINT = ".sommerl-part"
 SMALL = ["--size", "32", "--spp", "64"]
 # Of each command its arguments, within a folder that has samples.csv and nickel.smrl.
@@ -85,7 +85,7 @@ def main() -> int:
     parser.add_argument("--broken", action="store_true")
     options = parser.parse_args()
     names = options.commands.split(",")
-    program = [sys.executable, "-c", (BROKEN if options.broken else "") + EAGER + RUN]
+    broken = BROKEN if options.broken else ""
     violations: list[str] = []
     counts: Counter[tuple[str, str]] = Counter()
     rng = random.Random(options.seed)
@@ -95,6 +95,7 @@ def main() -> int:
         good: dict[str, Good] = {}
         for kill in range(options.kills):
             name = names[kill % len(names)]
+            program = [sys.executable, "-c", broken + (EAGER if name.startswith("render") else "") + RUN]
             if name not in good:
                 good[name] = _undisturbed(program, COMMANDS[name], inputs, Path(folder) / "good")
             number, when, old = rng.choice(SIGNALS), rng.uniform(0, 1.05) * good[name].seconds, rng.random() < 0.5

@@ -83,6 +83,15 @@ def test_the_mode_of_a_replaced_file_is_kept(tmp_path):
         assert stat.S_IMODE(path.stat().st_mode) == mode
 
 
+def test_a_file_that_cannot_be_written_is_not_replaced(tmp_path, monkeypatch):
+    path = tmp_path / "x.smrl"
+    path.write_bytes(b"SMRL")
+    monkeypatch.setattr(os, "access", lambda path, mode: False)  # as its mode says, which root would not be told
+    for overwrite in (False, True):
+        with keeping(overwrite=overwrite), pytest.raises(PermissionError, match="cannot be written"):
+            check_writable(path)
+
+
 def written_by_all(folder):
     """A file of every format that a command writes and that has room for a mark."""
     material = compact_material(NODES)

@@ -7,9 +7,11 @@ packages of sommerl[render].
 import sys
 from importlib import import_module
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False  # as in `typing`, which takes long to load
 if TYPE_CHECKING:
+    from typing import Any
+
     from .brdf import Brdf
     from .errors import SommerlError
     from .lattice import MERL, Lattice
@@ -60,7 +62,7 @@ _MODULES = {
 }
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     """A name is imported when it is first asked for: the command line has signals to hold back before NumPy comes."""
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
@@ -71,7 +73,7 @@ def __getattr__(name: str) -> Any:
 class _Package(ModuleType):
     """Here, `load` is the function, also once the module of that name has been imported."""
 
-    def __setattr__(self, name: str, value: Any) -> None:
+    def __setattr__(self, name: str, value: object) -> None:
         if name not in _MODULES or not isinstance(value, ModuleType):
             super().__setattr__(name, value)
 

@@ -6,7 +6,6 @@ Nothing but Python's own modules is imported before signals are held back: NumPy
 import os
 import sys
 from collections.abc import Callable
-from typing import NoReturn
 
 from .interrupt import STATUS, heed, remove_temporaries, undisturbed, unheeded
 
@@ -27,6 +26,7 @@ def main() -> int:
     except KeyboardInterrupt:
         unheeded()
         _interrupted()
+        os._exit(STATUS)
     unheeded()
     if not settled() and status == 0:
         return fail("standard output: cannot be written", 1)
@@ -40,13 +40,12 @@ def _status(run: Callable[[], int]) -> int:
         return int(stop.code or 0)
 
 
-def _interrupted() -> NoReturn:
+def _interrupted() -> None:
     from .outcome import fail, settled
 
     remove_temporaries()
     fail("interrupted; nothing was left half-written", STATUS)
     settled()
-    os._exit(STATUS)
 
 
 def _open_streams() -> bool:

@@ -13,7 +13,6 @@ import time
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import Any, ClassVar
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 STATUS = 130  # of a command that was interrupted
@@ -22,9 +21,11 @@ PATIENCE = 0.3  # seconds in which signals count as one: `timeout` and terminals
 temporaries: set[str] = set()  #: paths of files that go if the process has to end at once
 
 
+_holds: list[list[int]] = []  # the signals that came in the block that is not to be disturbed, if there is one
+
+
 class _State:
     first: float | None = None  # when the command was first told to end
-    holds: ClassVar[list[list[int]]] = []  # the signals that came in a block that is not to be disturbed
 
 
 def heed() -> None:
@@ -57,11 +58,11 @@ def undisturbed() -> Generator[None]:
     their threads to write to memory that is gone."""
     kept = signal.getsignal(signal.SIGINT)
     command, library = kept is _told, kept is signal.default_int_handler
-    if threading.current_thread() is not threading.main_thread() or _State.holds or not (command or library):
+    if threading.current_thread() is not threading.main_thread() or _holds or not (command or library):
         yield
         return
     came: list[int] = []
-    _State.holds.append(came)
+    _holds.append(came)
     try:
         if library:
             signal.signal(signal.SIGINT, lambda number, _: came.append(number))
@@ -72,7 +73,7 @@ def undisturbed() -> Generator[None]:
     finally:
         if library:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        _State.holds.remove(came)
+        _holds.remove(came)
     if came:
         raise KeyboardInterrupt
 
@@ -82,15 +83,15 @@ def _told(number: int, frame: FrameType | None) -> None:
     now = time.monotonic()
     if _State.first is None:
         _State.first = now
-        if not _State.holds:
+        if not _holds:
             raise KeyboardInterrupt
-        _State.holds[0].append(number)
+        _holds[0].append(number)
     elif now - _State.first > PATIENCE:
         remove_temporaries()
         os._exit(STATUS)
 
 
-def _again(unraisable: Any) -> None:
+def _again(unraisable: sys.UnraisableHookArgs) -> None:
     """An interruption that came where nobody could be told of it, as while Python collects garbage, comes again."""
     if unraisable.exc_type is KeyboardInterrupt:
         _State.first = None
