@@ -143,7 +143,7 @@ def _target(path: Path) -> Path | None:
     if stat.S_ISFIFO(found.st_mode) or stat.S_ISCHR(found.st_mode):
         return None
     if not stat.S_ISREG(found.st_mode):
-        kinds = {stat.S_IFDIR: "directory", stat.S_IFSOCK: "socket", stat.S_IFBLK: "device of blocks"}
+        kinds = {stat.S_IFDIR: "directory", stat.S_IFSOCK: "socket", stat.S_IFBLK: "block device"}
         kind = kinds.get(stat.S_IFMT(found.st_mode), "thing of another kind")
         code = errno.EISDIR if kind == "directory" else errno.EINVAL
         raise OSError(code, f"expected a file to write, found a {kind}", str(path))

@@ -19,8 +19,6 @@ STATUS = 130  # of a command that was interrupted
 PATIENCE = 0.3  # seconds in which signals count as one: `timeout` and terminals send each twice
 
 temporaries: set[str] = set()  #: paths of files that go if the process has to end at once
-
-
 _holds: list[list[int]] = []  # the signals that came in the block that is not to be disturbed, if there is one
 
 
@@ -56,8 +54,8 @@ def undisturbed() -> Generator[None]:
     """Holds an interruption back until the block has ended, and raises KeyboardInterrupt then: what was under way is
     not to be used. Within imports, renders and calls that start threads, others make another error of it, or leave
     their threads to write to memory that is gone."""
-    kept = signal.getsignal(signal.SIGINT)
-    command, library = kept is _told, kept is signal.default_int_handler
+    command = any(signal.getsignal(number) is _told for number in SIGNALS)
+    library = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if threading.current_thread() is not threading.main_thread() or _holds or not (command or library):
         yield
         return

@@ -182,14 +182,15 @@ class Checkpoint:
     def _set_aside(self, error: Exception) -> None:
         """Keeps a file that does not serve under another name."""
         why = error.strerror if isinstance(error, OSError) else visible(str(error))
+        found = f"expected a checkpoint, found a damaged one or another file ({why})"
         try:
             aside = next(path for path in _names_aside(self.path) if not path.exists())
             self.path.rename(aside)
         except OSError as failure:
             self._writable = False
-            self._say(f"{self.path}: {why}; the render starts anew, and keeps nothing ({failure.strerror})")
+            self._say(f"{self.path}: {found}; the render starts anew, and keeps nothing ({failure.strerror})")
             return
-        self._say(f"{self.path}: {why}; it is kept as {aside.name}, and the render starts anew")
+        self._say(f"{self.path}: {found}; it is kept as {aside.name}, and the render starts anew")
 
 
 def checkpoint_of(output: Path) -> Path:
