@@ -1,6 +1,5 @@
 """Long renders by the command `render`: stopped, and going on."""
 
-import os
 import signal
 import subprocess
 import sys
@@ -11,7 +10,6 @@ import pytest
 from helpers import run, run_json
 
 from sommerl import console
-from sommerl.interrupt import undisturbed
 from sommerl.render import checkpoint, passes
 from sommerl.render.environment import default_environment
 from sommerl.render.images import write_image
@@ -64,11 +62,12 @@ OWN = """<scene version="3.0.0">
     [
         (signal.SIGKILL, "", False),
         (signal.SIGINT, "", False),
+        (signal.SIGTERM, "", False),
         (signal.SIGINT, SCALAR, False),
         (signal.SIGKILL, "", True),
-        (signal.SIGINT, "", True),
+        (signal.SIGTERM, "", True),
     ],
-    ids=["kill", "int", "scalar", "kill-own", "int-own"],
+    ids=["kill", "int", "term", "scalar", "kill-own", "term-own"],
 )
 def test_killed_and_started_again_it_goes_on_to_the_same_image(tmp_path, kind, before, own):
     """Without LLVM, Mitsuba hands over a pass that was interrupted as it is, with a part of its pixels black."""
@@ -85,10 +84,10 @@ def test_killed_and_started_again_it_goes_on_to_the_same_image(tmp_path, kind, b
         time.sleep(0.15)  # into the next pass
     process.send_signal(kind)
     _, err = process.communicate(timeout=60)
-    assert process.returncode != 0
+    assert process.returncode == (-kind if kind == signal.SIGKILL else 130)
     assert part.exists()
     assert not path.exists()
-    assert (f"{part}: from here, the same command goes on" in err) == (kind == signal.SIGINT)
+    assert (f"{part}: from here, the same command goes on" in err) == (kind != signal.SIGKILL)
     again = start(*options, "-o", path, before=before)
     out, err = again.communicate(timeout=60)
     assert (again.returncode, err) == (0, "")
@@ -103,21 +102,22 @@ def test_killed_and_started_again_it_goes_on_to_the_same_image(tmp_path, kind, b
 
 def test_a_file_in_the_place_of_a_checkpoint_that_is_none(capsys, tmp_path):
     part = tmp_path / "x.png.sommerl-part"
-    part.write_bytes(b"something")
+    part.mkdir()
     status, _, err = run(capsys, "render", "nickel", "-o", tmp_path / "x.png", *SMALL)
     assert status == 2
     assert err == f"error: {part}: expected a checkpoint or nothing, found something else, which is kept\n"
-    assert part.read_bytes() == b"something"
     assert not (tmp_path / "x.png").exists()
-    part.unlink()
-    part.mkdir()
-    assert run(capsys, "render", "nickel", "-o", tmp_path / "x.png", *SMALL)[0] == 2
     part.rmdir()
-    part.write_bytes(b"SMRLPART and nothing more")
-    status, _, err = run(capsys, "render", "nickel", "-o", tmp_path / "x.png", *SMALL)
-    assert status == 0
-    assert err == f"warning: {part}: expected a checkpoint, found a broken one; the render starts anew\n"
-    assert not part.exists()
+    for number, content in (("", b""), (2, b"something else"), (3, b"SMRP\1\0 and nothing more")):
+        part.write_bytes(content)
+        status, _, err = run(capsys, "render", "nickel", "-o", tmp_path / "x.png", *SMALL)
+        aside = tmp_path / f"{part.name}.damaged{number}"
+        assert status == 0
+        assert err.startswith(f"warning: {part}: expected ")
+        assert err.endswith(f"; it is kept as {aside.name}, and the render starts anew\n")
+        assert err.count("\n") == 1
+        assert aside.read_bytes() == content
+        assert not part.exists()
 
 
 CHANGES = {
@@ -158,28 +158,6 @@ def test_whatever_decides_the_pixels_makes_it_another_render(capsys, tmp_path, m
     status, _, err = run(capsys, "render", *given, *change)
     assert status == 0
     assert f"expected the same render, found another {what}; this one starts anew" in err
-
-
-def test_an_interruption_waits_for_the_end_of_the_block():
-    """And is not lost, if the block makes another error of it."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    reached = []
-
-    @undisturbed()
-    def interrupted(error):
-        os.kill(os.getpid(), signal.SIGINT)
-        time.sleep(0.01)
-        reached.append(error)
-        if error:
-            raise RuntimeError
-
-    for error in (False, True):
-        with pytest.raises(KeyboardInterrupt):
-            interrupted(error)
-    assert reached == [False, True]
-    with pytest.raises(RuntimeError), undisturbed():
-        raise RuntimeError
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_a_checkpoint_that_cannot_be_written_stops_nothing(capsys, tmp_path, monkeypatch):

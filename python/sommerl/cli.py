@@ -6,7 +6,6 @@ import argparse
 import io
 import json
 import math
-import os
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
@@ -14,12 +13,13 @@ from pathlib import Path
 from typing import Any, NoReturn, get_args
 
 from . import __version__, commands, convert, demo, own_scenes, plots, rendering
-from .errors import OptionError, SommerlError
 from .factored.fit import FactorOptions
+from .files import keeping
 from .fitting.options import MOST_LOBES, FitOptions, Loss, Sampling
 from .lattice import INTERPOLATIONS
 from .materials import NAMES
 from .models.multi_lobe import FAMILIES
+from .outcome import outcome
 from .paper import report
 from .render.passes import DEFAULT_SIZE, DEFAULT_SPP
 from .render.scenes import STAGES
@@ -57,35 +57,28 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"error: {message} (see {self.prog} --help)\n")
 
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """As argparse does, but that help which cannot be printed is an error."""
+        if file is sys.stdout:
+            print(message, end="")
+        else:
+            super()._print_message(message, file)
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status: 0, 1 for an error in the input, 2 for one in the options."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # not every terminal has a multiplication sign
-    options = _parser().parse_args(arguments)
-    try:
-        result = options.run(options)
+
+    def command() -> None:
+        options = _parser().parse_args(arguments)
+        with keeping(overwrite=getattr(options, "overwrite", False)):
+            result = options.run(options)
         if options.json:
             print(json.dumps(_finite(result), indent=2))
-        sys.stdout.flush()
-    except OptionError as error:
-        return _fail(str(error), 2)
-    except SommerlError as error:
-        return _fail(str(error), 1)
-    except BrokenPipeError:  # whoever read the output has had enough; nobody is left to be told
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
-    except OSError as error:
-        return _fail(f"{error.filename or 'output'}: {error.strerror or error}", 1)
-    except MemoryError:
-        return _fail("not enough memory", 1)
-    return 0
 
-
-def _fail(message: str, status: int) -> int:
-    print(f"error: {message}", file=sys.stderr)
-    return status
+    return outcome(command)
 
 
 def _finite(value: Any) -> Any:
@@ -120,6 +113,10 @@ def _command(add: Any, name: str, run: Any, summary: str, example: str) -> Any:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     command.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    if run is not commands.info:
+        command.add_argument(
+            "--overwrite", action="store_true", help="replace files that Sommerl did not write, and measurements, too"
+        )
     command.set_defaults(run=run)
     return command
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from argparse import Namespace
 from collections.abc import Generator
@@ -75,7 +74,7 @@ def compress(options: Namespace) -> dict[str, Any]:
             if len(options.inputs) == 1:
                 raise
             failed += 1
-            print(f"error: {error}", file=sys.stderr)
+            console.tell(f"error: {error}")
     if failed:
         raise MaterialError(f"inputs: expected to compress {len(options.inputs)} materials, found {failed} that failed")
     return results[0] if len(results) == 1 else {"materials": results}
@@ -340,7 +339,7 @@ def goes_on_from(checkpoint: Checkpoint) -> Generator[console.Advance | None]:
             yield advance
     except KeyboardInterrupt:
         if checkpoint.holds:
-            print(f"{checkpoint.path}: from here, the same command goes on", file=sys.stderr)
+            console.tell(f"{checkpoint.path}: from here, the same command goes on")
         raise
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 Advance = Callable[[int, int], None]
 
@@ -33,7 +33,13 @@ class Warnings(list[str]):
 
     def say(self, sentence: str) -> None:
         self.append(sentence)
-        print(f"warning: {sentence}", file=sys.stderr)
+        tell(f"warning: {sentence}")
+
+
+def tell(line: str) -> None:
+    """Prints a line on standard error. If that takes nothing, nobody is told: no reason to stop."""
+    with suppress(OSError):
+        print(line, file=sys.stderr)
 
 
 def print_rows(title: str, rows: Mapping[str, str]) -> None:

@@ -14,9 +14,9 @@ from __future__ import annotations
 import hashlib
 import struct
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 from .brdf import Brdf
 from .errors import FormatError, SommerlError
@@ -35,19 +35,34 @@ def sealed(magic: bytes, version: int, body: bytes) -> bytes:
     return PREFIX.pack(magic, version, zlib.crc32(body)) + body
 
 
+def write_sealed(out: BinaryIO, magic: bytes, version: int, parts: Sequence[Any]) -> None:
+    """Writes such a file around a body in parts, arrays among them, which are not copied."""
+    crc = 0
+    for part in parts:
+        crc = zlib.crc32(part, crc)
+    out.write(PREFIX.pack(magic, version, crc))
+    for part in parts:
+        out.write(part)
+
+
 def opened(data: bytes, magic: bytes, version: int, kind: str) -> Reader:
     """A reader of the body. Raises FormatError for another kind of file, another version, or a damaged file."""
+    check(zlib.crc32(memoryview(data)[PREFIX.size :]), data, magic, version, kind)
+    return Reader(data, PREFIX.size)
+
+
+def check(crc: int, data: bytes, magic: bytes, version: int, kind: str) -> None:
+    """Raises FormatError as `opened` does. crc: of what comes after PREFIX, with which data begins."""
     if len(data) < PREFIX.size:
         raise FormatError(f"expected at least {PREFIX.size} bytes, found {len(data)}")
-    found_magic, found_version, crc = PREFIX.unpack_from(data)
+    found_magic, found_version, expected = PREFIX.unpack_from(data)
     if found_magic != magic:
         raise FormatError(f"expected a {kind}, found another kind")
     if found_version != version:
         hint = "a newer Sommerl may read it" if found_version > version else "make it from its source again"
         raise FormatError(f"expected version {version}, found version {found_version}; {hint}")
-    if zlib.crc32(data[PREFIX.size :]) != crc:
+    if crc != expected:
         raise FormatError("expected the checksum in the file, found another: the file is damaged or cut off")
-    return Reader(data, PREFIX.size)
 
 
 def load(path: str | Path, longest: int, decode: Callable[[bytes], Material]) -> Material:

@@ -44,11 +44,12 @@ def convert(options: Namespace) -> dict[str, Any]:
         result = compress_one(BrdfTable.of(brdf), output, TrainOptions(), options.json)
     else:
         written = _write(brdf, options, extension)
-        size = output.stat().st_size
+        size = output.stat().st_size if output.is_file() else None  # of what went through a pipe
         result = {"output": str(output), "bytes_disk": size, "cells_clamped": getattr(written, "cells_clamped", None)}
         if not options.json:
             clamped = f", {result['cells_clamped']} cells clamped to 0" if result["cells_clamped"] else ""
-            print(f"{written.name} → {output} ({console.size(size)}{clamped})")
+            written_as = "through a pipe" if size is None else console.size(size)
+            print(f"{written.name} → {output} ({written_as}{clamped})")
     if not options.json:
         _print_report(report | {"facts": {}} if "epochs" in result else report)
     return result | report

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import MissingDependencyError
+from .interrupt import undisturbed
 
 OLDEST_LLVM = 17
 PATH_VARIABLE = "DRJIT_LIBLLVM_PATH"
@@ -28,8 +29,9 @@ def drjit() -> Any:
     """The module `drjit`. Raises MissingDependencyError if it is not installed."""
     if importlib.util.find_spec("drjit") is None:
         raise MissingDependencyError("fitting needs Dr.Jit: install sommerl[fit]")
-    choose_llvm()
-    return importlib.import_module("drjit")
+    with undisturbed():
+        choose_llvm()
+        return importlib.import_module("drjit")
 
 
 def float64() -> Any:
@@ -43,7 +45,8 @@ def float64() -> Any:
             f"fitting: expected a libLLVM {OLDEST_LLVM} or newer, found none; on Linux, install sommerl[fit], or set "
             f"{PATH_VARIABLE}"
         )
-    return importlib.import_module("drjit.llvm.ad").Float64
+    with undisturbed():
+        return importlib.import_module("drjit.llvm.ad").Float64
 
 
 def has_llvm(dr: Any) -> bool:

@@ -64,7 +64,14 @@ def render(path: Path, options: Namespace) -> dict[str, Any]:
             check_apart(written, path, *files.values())
         identity = {"scene": sha256_of(path)} | {f"-D {name}": value for name, value in parameters.items()}
         identity |= {f"file {name}": sha256_of(file) for name, file in files.items()}
-        checkpoint = Checkpoint(checkpoint_of(options.output), identity, warnings.say)
+        width, height = scene.size
+        checkpoint = Checkpoint(
+            checkpoint_of(options.output),
+            identity,
+            (height, width),
+            warnings.say,
+            channels=scene_file.channels_held(scene),
+        )
         started = time.perf_counter()
         with goes_on_from(checkpoint) as advance:
             bitmap = scene_file.render(scene, spp=spp, seed=options.seed, progress=advance, checkpoint=checkpoint)

@@ -129,7 +129,7 @@ def _render(options: Namespace) -> dict[str, Any]:
         identity["environment"] = content(setting.environment)
     if setting.mesh:
         identity["mesh"] = content(setting.mesh.positions, setting.mesh.faces, setting.mesh.normals)
-    checkpoint = Checkpoint(checkpoint_of(options.output), identity, warn)
+    checkpoint = Checkpoint(checkpoint_of(options.output), identity, (options.size, options.size), warn)
     started = time.perf_counter()
     candidates, references = _rendered(options, pairs, materials, setting, checkpoint)
     seconds = time.perf_counter() - started

@@ -30,7 +30,7 @@ class Job:
         self.path, self.said, self.steps = folder / "out.png.sommerl-part", [], []
 
     def __call__(self, stop=0, material="1", resume=True, **options):
-        kept = Checkpoint(self.path, {"material": material}, self.said.append) if resume else None
+        kept = Checkpoint(self.path, {"material": material}, (SIZE, SIZE), self.said.append) if resume else None
         environment = default_environment(32)
         names = "nickel", "pearl-paint"
         scenes = [lambda name=name: sphere(builtin(name), environment, size=SIZE) for name in names]
@@ -126,7 +126,7 @@ def test_a_broken_checkpoint_is_ignored_and_named(job, number):
     assert not kept.resumed
     (sentence,) = job.said
     check_sentence(sentence, str(job.path))
-    assert "found a broken one" in sentence
+    assert "found a damaged one" in sentence
     assert np.array_equal(pixels, job(resume=False)[0])
 
 
@@ -164,13 +164,13 @@ def test_an_empty_state_is_not_worth_a_file(job):
         raise Stopped
 
     with pytest.raises(Stopped):
-        render_all([fail], checkpoint=Checkpoint(job.path, {}, print))
+        render_all([fail], checkpoint=Checkpoint(job.path, {}, (SIZE, SIZE), print))
     assert not job.path.exists()
 
 
 def test_writing_takes_a_small_share_of_the_time(tmp_path, monkeypatch):
     monkeypatch.setattr(checkpoints, "SECONDS", 0.0)
-    kept = Checkpoint(tmp_path / "x", {}, print)
+    kept = Checkpoint(tmp_path / "x", {}, (512, 512), print)
     state = State((), np.zeros((512, 512, 3)), 1)
     kept.save(state)
     kept.path.unlink()

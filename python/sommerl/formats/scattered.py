@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..arrays import Triple, split
 from ..errors import FormatError, MaterialError
 from ..half_diff import directions, half_diff, spherical
+from ..interrupt import undisturbed
 from ..lattice import MERL, Lattice
 from ..metrics import LOG_FLOOR
 from ..optional import optional
@@ -164,7 +165,8 @@ def _planes(
     tree: Any, known: NDArray[np.float64], domain: NDArray[np.float64], wanted: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """At each wanted point, the height of the plane fitted to its neighbours."""
-    found: tuple[NDArray[np.float64], NDArray[np.intp]] = tree.query(wanted, NEIGHBOURS, workers=-1)
+    with undisturbed():  # SciPy would leave its threads behind, at work on arrays that are gone
+        found: tuple[NDArray[np.float64], NDArray[np.intp]] = tree.query(wanted, NEIGHBOURS, workers=-1)
     distance, nearest = found
     reach = distance[:, -1:] * (1 + 1e-6) + 1e-12
     weight = (1 - (distance / reach) ** 3) ** 3
@@ -180,7 +182,9 @@ def _planes(
 def _near(samples: Samples, wi: Triple, wo: Triple) -> NDArray[np.bool_]:
     """Whether a sample lies within REACH of each pair, in half/difference angles."""
     known = _coordinates(split(samples.wi), split(samples.wo), root=False)
-    distance, _ = _tree(known).query(_coordinates(wi, wo, root=False), distance_upper_bound=REACH, workers=-1)
+    tree, wanted = _tree(known), _coordinates(wi, wo, root=False)
+    with undisturbed():
+        distance, _ = tree.query(wanted, distance_upper_bound=REACH, workers=-1)
     return np.isfinite(distance)
 
 

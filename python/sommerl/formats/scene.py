@@ -14,14 +14,15 @@ from ..files import atomic_write, visible
 from .names import printable, split_member
 
 HEAD = """\
-<!-- The file's name is relative to this file. A scene with this file in it: sommerl render scene.xml -o scene.exr
+<!-- Written by Sommerl. The material's file is named relative to this one. A scene with this file in it:
+       sommerl render scene.xml -o scene.exr
      In Python, before it is loaded:
        from sommerl.render.llvm import mitsuba; from sommerl.render.bsdf import register
        mi = mitsuba(); register(); scene = mi.load_file("scene.xml")
      In the scene, a file in this folder: <include filename={include}/>, and <ref id={id}/> in each shape. -->
 """
 COMMENT = (
-    "The file's name is relative to this file. In Python: from sommerl.render.llvm import mitsuba; from "
+    "Written by Sommerl. The material's file is named relative to this one. In Python: from sommerl.render.llvm import mitsuba; from "
     "sommerl.render.bsdf import register, snippet; mi = mitsuba(); register(); bsdf = mi.load_dict(snippet({path}))"
 )
 CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")  # which no XML file may have

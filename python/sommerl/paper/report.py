@@ -7,6 +7,7 @@ import io
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -56,11 +57,14 @@ def paper(options: Namespace) -> dict[str, Any]:
     options.out.mkdir(parents=True, exist_ok=True)
     chosen = FitOptions(samples=options.samples, seed=options.seed)
     result: dict[str, Any] = {}
-    for item in ITEMS if options.item == "all" else [options.item]:
+    files = {
+        item: [options.out / f"{item}.{extension}" for extension in ("csv", "png")]
+        for item in (ITEMS if options.item == "all" else [options.item])
+    }
+    for path in chain(*files.values()):
+        check_writable(path)
+    for item, (target, picture) in files.items():
         title, make = ITEMS[item]
-        target, picture = options.out / f"{item}.csv", options.out / f"{item}.png"
-        for path in (target, picture):
-            check_writable(path)
         with console.progress(title) as advance:
             rows = [asdict(row) for row in make(options.data, chosen, picture, advance)]
         _write(target, rows)

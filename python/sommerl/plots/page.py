@@ -20,11 +20,12 @@ Materials = Brdf | Mapping[str, Brdf]  #: a material, or several by the names th
 DPI = 110
 LONGEST_NAME = 60
 THETA_H_TICKS = (0, 1, 5, 15, 30, 50, 90)  # degrees, on an axis of √θ_h
-# Extensions, and what is left out: when, and with which version of matplotlib, a file was written.
-FORMATS: dict[str, dict[str, None]] = {
-    ".png": {"Software": None},
-    ".pdf": {"Creator": None, "Producer": None, "CreationDate": None},
-    ".svg": {"Creator": None, "Date": None},
+# Extensions, and what files carry: a mark (see `files`), but not when, and with which version of matplotlib, they were
+# written.
+FORMATS: dict[str, dict[str, str | None]] = {
+    ".png": {"Software": "Sommerl"},
+    ".pdf": {"Creator": "Sommerl", "Producer": None, "CreationDate": None},
+    ".svg": {"Creator": "Sommerl", "Date": None},
 }
 STYLES = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 2, 1, 2)), (0, (9, 2)))  # of lines, one a material
 MOST_MATERIALS = len(STYLES)

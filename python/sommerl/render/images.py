@@ -28,6 +28,7 @@ def encode(pixels: NDArray[Any]) -> bytes:
     kind = mi.Bitmap.FileFormat.PNG if pixels.dtype == np.uint8 else mi.Bitmap.FileFormat.OpenEXR
     bitmap = mi.Bitmap(np.ascontiguousarray(pixels))
     bitmap.set_srgb_gamma(pixels.dtype == np.uint8)
+    bitmap.metadata()["Software"] = "Sommerl"  # a mark: see `files`
     bitmap.write(stream, kind)
     return bytes(stream.raw_buffer())
 
@@ -153,6 +154,7 @@ def write_page(
 PAGE = """<!doctype html>
 <html lang="en">
 <meta charset="utf-8">
+<meta name="generator" content="Sommerl">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{title}</title>
 <style>

@@ -62,8 +62,8 @@ def _check(variant: str) -> None:
 def _module() -> Any:
     if importlib.util.find_spec("mitsuba") is None:
         raise MissingDependencyError("rendering needs Mitsuba: install sommerl[render]")
-    jit.choose_llvm()
     with undisturbed():
+        jit.choose_llvm()
         return importlib.import_module("mitsuba")
 
 

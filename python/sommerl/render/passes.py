@@ -50,7 +50,8 @@ def render_all(
     is written every few seconds and when Python is interrupted; and is left for the caller to remove.
     """
     mi = mitsuba()
-    state = checkpoint.load(_identity(spp, seed)) if checkpoint else State()
+    count = len(_passes(spp, checkpoint.pixels)) if checkpoint else 0
+    state = checkpoint.load(_identity(spp, seed), len(scenes), count) if checkpoint else State()
     try:
         for make in scenes[len(state.images) :]:
             with undisturbed():
@@ -91,7 +92,7 @@ def sum_of_passes(
     It is resumed as `render_all` is.
     """
     passes = _passes(spp, pixels)
-    state = checkpoint.load(_identity(spp, seed)) if checkpoint else State()
+    state = checkpoint.load(_identity(spp, seed), 1, len(passes)) if checkpoint else State()
     try:
         reached = _after_each(state, passes, seed, one, checkpoint)
         for state in reached:

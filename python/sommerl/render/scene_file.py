@@ -125,6 +125,14 @@ def channels_of(bitmap: Any) -> list[str]:
     return [field.name for field in bitmap.struct_()]
 
 
+def channels_held(scene: OwnScene) -> int:
+    """How many channels the film holds before it is developed, weights among them."""
+    film = scene.sensor.film()
+    with refused(scene.path, "render"), undisturbed():
+        film.prepare(scene.mitsuba.integrator().aov_names())
+        return len(channels_of(film.bitmap(raw=True)))
+
+
 def check_colours(scene: OwnScene) -> None:
     """Raises FormatError if the film's channels are no colours, which a PNG needs."""
     film = scene.sensor.film()
@@ -144,6 +152,7 @@ def write(path: Path, bitmap: Any) -> None:
         write_image(path, to_srgb8(np.nan_to_num(np.array(rgb))))
         return
     stream = mi.MemoryStream()
+    bitmap.metadata()["Software"] = "Sommerl"  # a mark: see `files`
     bitmap.write(stream, mi.Bitmap.FileFormat.OpenEXR)
     with atomic_write(path) as out:
         out.write(bytes(stream.raw_buffer()))
