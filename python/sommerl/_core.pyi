@@ -86,11 +86,14 @@ class NodePalette:
     ) -> tuple[NodePalette, tuple[NDArray[np.uint16], NDArray[np.uint16]]]:
         """What a stream holds: lattice and palette; and the gain and the shape of each node, (nodes,) each.
 
-        simd changes nothing but the time. Raises ValueError for a stream that `encode` does not write.
+        simd changes nothing but the time. Raises ValueError for a stream that `encode` does not write, with the same
+        sentence as the other readers.
         """
 
     def encode(self, gain: NDArray[np.uint16], shape: NDArray[np.uint16], simd: str | None = None) -> bytes:
-        """The stream of a gain and a shape for each node, (nodes,) each. Raises ValueError for what does not fit."""
+        """The stream of a gain and a shape for each node, (nodes,) each. Raises ValueError for what does not fit, and
+        for what would keep readers busy for too long.
+        """
 
     def measure(self, gain: NDArray[np.uint16], shape: NDArray[np.uint16]) -> tuple[float, float]:
         """The bits that the stream would take: for lattice and palette, and for the indices."""
