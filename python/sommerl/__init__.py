@@ -4,6 +4,7 @@ Needs NumPy alone. Pictures, and the metrics on them, are in `sommerl.render` an
 packages of sommerl[render].
 """
 
+from . import threads  # before NumPy is imported
 from .brdf import Brdf
 from .errors import SommerlError
 from .lattice import MERL, Lattice
@@ -32,5 +33,6 @@ __all__ = [
     "load",
     "load_table",
     "save",
+    "threads",
     "train",
 ]

@@ -13,7 +13,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, NoReturn, get_args
 
-from . import __version__, commands, convert, demo, plots, rendering
+from . import __version__, commands, convert, demo, plots, rendering, threads
 from .errors import OptionError, SommerlError
 from .factored.fit import FactorOptions
 from .fitting.options import MOST_LOBES, FitOptions, Loss, Sampling
@@ -65,6 +65,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="replace")  # not every terminal has a multiplication sign
     options = _parser().parse_args(arguments)
     try:
+        if options.threads is not None:
+            threads.use(threads.checked(options.threads, threads.OPTION))
+        threads.limit()
         result = options.run(options)
         if options.json:
             print(json.dumps(_finite(result), indent=2))
@@ -120,6 +123,11 @@ def _command(add: Any, name: str, run: Any, summary: str, example: str) -> Any:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     command.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    command.add_argument(
+        threads.OPTION,
+        metavar="N",
+        help=f"the most that work at once ({threads.VARIABLE}; if not set, as many as there are processors)",
+    )
     command.set_defaults(run=run)
     return command
 

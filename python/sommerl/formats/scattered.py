@@ -20,6 +20,7 @@ from ..lattice import MERL, Lattice
 from ..metrics import LOG_FLOOR
 from ..optional import optional
 from ..table import BrdfTable
+from ..threads import limit
 
 NEIGHBOURS = 16
 RIDGE = 1e-3  # keeps the planes flat where neighbours leave their slope open
@@ -164,7 +165,7 @@ def _planes(
     tree: Any, known: NDArray[np.float64], domain: NDArray[np.float64], wanted: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """At each wanted point, the height of the plane fitted to its neighbours."""
-    found: tuple[NDArray[np.float64], NDArray[np.intp]] = tree.query(wanted, NEIGHBOURS, workers=-1)
+    found: tuple[NDArray[np.float64], NDArray[np.intp]] = tree.query(wanted, NEIGHBOURS, workers=limit() or -1)
     distance, nearest = found
     reach = distance[:, -1:] * (1 + 1e-6) + 1e-12
     weight = (1 - (distance / reach) ** 3) ** 3
@@ -180,7 +181,9 @@ def _planes(
 def _near(samples: Samples, wi: Triple, wo: Triple) -> NDArray[np.bool_]:
     """Whether a sample lies within REACH of each pair, in half/difference angles."""
     known = _coordinates(split(samples.wi), split(samples.wo), root=False)
-    distance, _ = _tree(known).query(_coordinates(wi, wo, root=False), distance_upper_bound=REACH, workers=-1)
+    distance, _ = _tree(known).query(
+        _coordinates(wi, wo, root=False), distance_upper_bound=REACH, workers=limit() or -1
+    )
     return np.isfinite(distance)
 
 

@@ -24,8 +24,7 @@ def mitsuba() -> Any:
         with undisturbed():
             mi.set_variant(_variant(mi))
             dr = jit.drjit()
-            if dr.thread_count() < 2:
-                dr.set_thread_count(2)  # with one, Mitsuba waits for ever when it reads or writes OpenEXR files
+            dr.set_thread_count(max(jit.LEAST_THREADS, dr.thread_count()))
     if not mi.variant().endswith("rgb"):
         raise MissingDependencyError(f"Mitsuba's variant: expected one of RGB, like llvm_ad_rgb, found {mi.variant()}")
     return mi

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import __version__
+from .. import __version__, jit
 from ..interrupt import undisturbed
 from .checkpoint import Checkpoint, Image, State
 from .llvm import drjit, mitsuba
@@ -63,7 +63,7 @@ def render_all(
             if progress and state.passes:
                 progress(before + state.passes, of_all)
             for number in range(state.passes, len(passes)):
-                with undisturbed():
+                with undisturbed(), jit.limited():
                     pixels = np.array(mi.render(scene.mitsuba, spp=passes[number], seed=_seed(seed, number)))
                 # Not reached after an interruption: of the pass that it came in, Mitsuba may have left out a part.
                 total = passes[number] * pixels.astype(np.float64)
