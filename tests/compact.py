@@ -128,3 +128,68 @@ class Writer:
         last = self._low + self._range - 1
         roundest = next(last >> k << k for k in reversed(range(33)) if last >> k << k >= self._low)
         return roundest.to_bytes(self._bytes, "big").rstrip(b"\0")
+
+    def so_far(self):
+        """What is followed by zeros: of all that can be picked, always the first."""
+        return self._low.to_bytes(self._bytes, "big").rstrip(b"\0")
+
+
+def written(bands=1, theta_h=(0,), rows=(), axes=((0,), (0,)), gains=1, shapes=1, palette=()):
+    """A stream that starts with such numbers: bands; inner nodes and steps of θ_h; rows of bands; inner nodes and steps
+    of θ_d and φ_d; numbers of gains and shapes; codes, with numbers of contexts."""
+    return _head(bands, theta_h, rows, axes, gains, shapes, palette).finish()
+
+
+def _head(bands, theta_h, rows, axes, gains, shapes, palette):
+    writer = Writer()
+    counts, *steps = ([2048] * 24 for _ in range(4))
+    writer.number(bands - 1, counts)
+    for number in (axis := iter(theta_h)):
+        writer.number(number, counts)
+        for step in axis:
+            writer.number(step, steps[0])
+    for number in rows:
+        writer.number(number - 1, counts)
+    for i, (inner, *places) in enumerate(axes):
+        writer.number(inner, counts)
+        for step in places:
+            writer.number(step, steps[1 + i % 2])
+    counts, *steps = ([2048] * 24 for _ in range(4))
+    writer.number(gains - 1, counts)
+    writer.number(shapes - 1, counts)
+    for number, context in palette:
+        writer.number(number, steps[context])
+    return writer
+
+
+FULL = [64, *[0] * 64]
+GOOD = [(4095, 0), (0, 1), (0, 2)]
+
+
+def bomb():
+    """A few bytes that mean as many nodes and entries as there can be: all entries are alike, and all nodes have the
+    first ones."""
+    axes = ([62, *[0] * 62], [63, *[0] * 63])
+    palette = [*[(0, 0)] * 1024, *[(0, 1), (0, 2)] * 1024]
+    return _head(1, [30, *[0] * 30], (), axes, 1024, 1024, palette).so_far()
+
+
+HOSTILE_STREAMS = {
+    "bands": {"bands": 17},
+    "bands-2": {"bands": 2**21 - 1},
+    "axis": {"theta_h": [1, 179]},
+    "axis-2": {"theta_h": [180, *[0] * 180]},
+    "axis-3": {"theta_h": [2**21 - 2, *[0] * 180]},
+    "axis-4": {"theta_h": [1, 2**21 - 2]},
+    "band": {"bands": 2, "rows": [3]},
+    "band-2": {"bands": 2, "rows": [2]},
+    "band-3": {"bands": 3, "rows": [2]},
+    "nodes": {"theta_h": [62, *[0] * 62], "axes": (FULL, FULL)},
+    "gains": {"gains": 1025},
+    "shapes": {"shapes": 1025},
+    "gain": {"palette": [(4096, 0)]},
+    "gain-2": {"gains": 2, "palette": [(4095, 0), (0, 0)]},
+    "shape": {"palette": [(4095, 0), (2049, 1)]},
+    "shape-2": {"palette": [(4095, 0), (0, 1), (2049, 2)]},
+    "shape-3": {"palette": [(4095, 0), (0, 1), (2050, 2)]},
+}

@@ -8,6 +8,8 @@ import sys
 from importlib import import_module
 from types import ModuleType
 
+from . import threads  # before NumPy is imported
+
 TYPE_CHECKING = False  # as in `typing`, which takes long to load
 if TYPE_CHECKING:
     from typing import Any
@@ -40,6 +42,7 @@ __all__ = [
     "load",
     "load_table",
     "save",
+    "threads",
     "train",
 ]
 

@@ -1,4 +1,9 @@
-"""The Rust core. `som_man/reference.py` says the same in plain NumPy."""
+"""The Rust core. `som_man/reference.py` says the same in plain NumPy.
+
+What does not fit is a ValueError, if not a TypeError or an OverflowError of the conversion. threads: as many as there
+are processors if None, and in any case no more than `sommerl.threads.limit`. Where the system gives fewer, fewer do the
+work.
+"""
 
 from typing import Literal
 
@@ -27,14 +32,15 @@ class Learner:
         simd: str | None = None,
     ) -> None:
         """triples (n, 3): what the cells hold, in [0, 1], in the order of presentation; cells (n,): their numbers;
-        weights (M, 3): the units' first weights; columns: units in a row of the sheet. search and simd change nothing
-        but the time.
+        weights (M, 3): the units' first weights, in [0, 1]; columns: units in a row of the sheet. search and simd
+        change nothing but the time.
         """
 
     def present(self, start: int, stop: int, alpha: float, falloff: NDArray[np.float32]) -> float:
         """Presents a range of the order; returns the sum of the distances to the winners' weights.
 
-        falloff: learning weight by distance along a row or a column of the sheet; [1] moves the winner alone.
+        alpha: in [0, 1]. falloff: learning weight, in [0, 1], by distance along a row or a column of the sheet; [1]
+        moves the winner alone.
         """
 
     def settled(self) -> bool:
@@ -56,10 +62,10 @@ class Palette:
         simd: str | None = None,
         threads: int | None = None,
     ) -> None:
-        """lut: (M, 3). threads: as many as there are processors, if None."""
+        """lut: (M, 3), up to 1e18."""
 
     def query(self, triples: NDArray[np.float32]) -> NDArray[np.uint32]:
-        """The nearest entry, the lowest one of several, for each of triples (n, 3)."""
+        """The nearest entry, the lowest one of several, for each of triples (n, 3), up to 1e18."""
 
 class NodePalette:
     """The lattice and the palette of a compact material: its stream of bits, and which entries its nodes get.
@@ -86,11 +92,14 @@ class NodePalette:
     ) -> tuple[NodePalette, tuple[NDArray[np.uint16], NDArray[np.uint16]]]:
         """What a stream holds: lattice and palette; and the gain and the shape of each node, (nodes,) each.
 
-        simd changes nothing but the time. Raises ValueError for a stream that `encode` does not write.
+        simd changes nothing but the time. Raises ValueError for a stream that `encode` does not write, with the same
+        sentence as the other readers.
         """
 
     def encode(self, gain: NDArray[np.uint16], shape: NDArray[np.uint16], simd: str | None = None) -> bytes:
-        """The stream of a gain and a shape for each node, (nodes,) each. Raises ValueError for what does not fit."""
+        """The stream of a gain and a shape for each node, (nodes,) each. Raises ValueError for what does not fit, and
+        for what would keep readers busy for too long.
+        """
 
     def measure(self, gain: NDArray[np.uint16], shape: NDArray[np.uint16]) -> tuple[float, float]:
         """The bits that the stream would take: for lattice and palette, and for the indices."""
@@ -150,10 +159,10 @@ def lookup(
     simd: str | None = None,
     threads: int | None = None,
 ) -> NDArray[np.float64]:
-    """f_r (n, 3) of pairs of unit directions (n, 3), as `Brdf.eval` gives it for what is on a lattice.
+    """f_r (n, 3) of pairs of directions (n, 3), as `Brdf.eval` gives it for what is on a lattice.
 
-    values: flat triples, of the cells, or of a LUT if `index` has its entry for each cell. Angles are within 4 ulp of
-    NumPy's, so that a pair on the very edge of a cell may fall on the other side.
+    values: flat triples, of the cells, or of a LUT if `index` has its entry for each cell; NaN where the LUT has none.
+    Angles are within 4 ulp of NumPy's, so that a pair on the very edge of a cell may fall on the other side.
     """
 
 def lookup_nodes(
@@ -171,7 +180,7 @@ def lookup_nodes(
     simd: str | None = None,
     threads: int | None = None,
 ) -> NDArray[np.float64]:
-    """f_r (n, 3) of pairs of unit directions (n, 3), as `Brdf.eval` gives it for a `FittedTable` of such values.
+    """f_r (n, 3) of pairs of directions (n, 3), as `Brdf.eval` gives it for a `FittedTable` of such values.
 
     theta_h, band, theta_d, phi_d: the fields of the `NodeLattice`. gains (G,), shapes (S, 3), gain (nodes,) and
     shape (nodes,): y of a node is gains[gain] · shapes[shape]. simd and threads change nothing but the time. Raises

@@ -12,7 +12,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, NoReturn, get_args
 
-from . import __version__, commands, convert, demo, own_scenes, plots, rendering
+from . import __version__, commands, convert, demo, own_scenes, plots, rendering, threads
 from .factored.fit import FactorOptions
 from .files import keeping
 from .fitting.options import MOST_LOBES, FitOptions, Loss, Sampling
@@ -73,6 +73,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def command() -> None:
         options = _parser().parse_args(arguments)
+        if options.threads is not None:
+            threads.use(threads.checked(options.threads, threads.OPTION))
+        threads.limit()
         with keeping(overwrite=getattr(options, "overwrite", False)):
             result = options.run(options)
         if options.json:
@@ -117,6 +120,11 @@ def _command(add: Any, name: str, run: Any, summary: str, example: str) -> Any:
         command.add_argument(
             "--overwrite", action="store_true", help="replace files that Sommerl did not write, and measurements, too"
         )
+    command.add_argument(
+        threads.OPTION,
+        metavar="N",
+        help=f"the most that work at once ({threads.VARIABLE}; if not set, as many as there are processors)",
+    )
     command.set_defaults(run=run)
     return command
 

@@ -100,13 +100,16 @@ def deflated(payload: bytes) -> bytes:
 
 
 def inflated(compressed: bytes, expected: int) -> bytes:
-    """Exactly `expected` bytes, and never more than that in memory."""
+    """Exactly `expected` bytes, and never more than that in memory. Raises FormatError if that is not what there is."""
     inflater = zlib.decompressobj(-zlib.MAX_WBITS)
-    payload = inflater.decompress(compressed, expected)
-    if len(payload) == expected and not inflater.eof:
-        payload += inflater.decompress(inflater.unconsumed_tail, 1)
+    try:
+        payload = inflater.decompress(compressed, expected)
+        if len(payload) == expected and not inflater.eof:
+            payload += inflater.decompress(inflater.unconsumed_tail, 1)
+    except zlib.error:
+        payload = b""
     if len(payload) != expected or not inflater.eof or inflater.unused_data:
-        raise FormatError(f"expected a stream of {expected} bytes, found another number")
+        raise FormatError(f"expected a stream of {expected} bytes, deflated, that ends with the file, found another")
     return payload
 
 
@@ -128,7 +131,10 @@ class Reader:
 
     def origin(self) -> dict[str, str]:
         """Name and digest, as `origin` wrote them."""
-        name = self.take(*self.unpack(BYTE)).decode()
+        try:
+            name = self.take(*self.unpack(BYTE)).decode()
+        except UnicodeDecodeError as error:
+            raise FormatError("expected a name in UTF-8, found other bytes") from error
         (digest,) = self.unpack(BYTE)
         if digest not in (0, DIGEST_BYTES):
             raise FormatError(f"expected a digest of 0 or {DIGEST_BYTES} bytes, found {digest}")

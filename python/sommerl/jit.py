@@ -14,15 +14,18 @@ import importlib.util
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from .errors import MissingDependencyError
 from .interrupt import undisturbed
+from .threads import limit
 
 OLDEST_LLVM = 17
 PATH_VARIABLE = "DRJIT_LIBLLVM_PATH"
+LEAST_THREADS = 2  # the caller's among them: with one, Mitsuba waits for ever when it reads or writes OpenEXR files
 
 
 def drjit() -> Any:
@@ -31,7 +34,26 @@ def drjit() -> Any:
         raise MissingDependencyError("fitting needs Dr.Jit: install sommerl[fit]")
     with undisturbed():
         choose_llvm()
-        return importlib.import_module("drjit")
+        dr = importlib.import_module("drjit")
+    threads = limit()
+    if threads is not None and dr.thread_count() > max(LEAST_THREADS, threads):
+        dr.set_thread_count(max(LEAST_THREADS, threads))
+    return dr
+
+
+@contextmanager
+def limited() -> Generator[None]:
+    """For long work: no more threads than the limit, which may be one."""
+    dr, threads = drjit(), limit()
+    before = dr.thread_count()
+    if threads is None or threads == before:
+        yield
+        return
+    dr.set_thread_count(threads)
+    try:
+        yield
+    finally:
+        dr.set_thread_count(max(LEAST_THREADS, threads))
 
 
 def float64() -> Any:

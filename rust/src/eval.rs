@@ -2,6 +2,7 @@
 //! `half_diff.py` and `lattice.py`; the arctangent is our own, so that it vectorises, and within 2 ulp of the library's.
 
 use crate::simd::Path;
+use crate::threads::share_out;
 
 /// Pairs calculated together, stage by stage, in loops that vectorise.
 pub const BATCH: usize = 64;
@@ -11,8 +12,8 @@ pub type Room = [Batch; 4];
 
 /// What pairs of directions are evaluated for.
 pub trait Material: Sync {
-    /// Writes f_r of up to BATCH pairs; zeros where one is below the horizon. Every element is written. To be inlined
-    /// always: it is compiled once for each instruction set.
+    /// Writes f_r of up to BATCH pairs, `Pairs::told` where they say it all. Every element is written. To be inlined always: it
+    /// is compiled once for each instruction set.
     fn batch(&self, pairs: &Pairs, room: &mut Room, out: &mut [[f64; 3]]);
 }
 
@@ -48,8 +49,8 @@ impl Cells<'_> {
     }
 }
 
-/// Writes f_r of each pair (wi, wo) of directions to `out`, on several threads; zeros where one is below the horizon. Every
-/// element is written: `out` may be fresh memory.
+/// Writes f_r of each pair (wi, wo) of directions to `out`, on several threads; zeros where one is below the horizon, NaN where
+/// a component is no finite number. Every element is written: `out` may be fresh memory.
 pub fn eval(
     wi: &[[f64; 3]],
     wo: &[[f64; 3]],
@@ -62,11 +63,8 @@ pub fn eval(
     if wi.len() <= share {
         return eval_part(wi, wo, material, path, out); // a thread takes longer to start than a few pairs
     }
-    std::thread::scope(|scope| {
-        for ((wi, wo), out) in wi.chunks(share).zip(wo.chunks(share)).zip(out.chunks_mut(share)) {
-            scope.spawn(move || eval_part(wi, wo, material, path, out));
-        }
-    });
+    let parts = wi.chunks(share).zip(wo.chunks(share)).zip(out.chunks_mut(share));
+    share_out(parts, threads, |((wi, wo), out)| eval_part(wi, wo, material, path, out));
 }
 
 fn eval_part(wi: &[[f64; 3]], wo: &[[f64; 3]], material: &impl Material, path: Path, out: &mut [[f64; 3]]) {
@@ -84,7 +82,7 @@ fn eval_part(wi: &[[f64; 3]], wo: &[[f64; 3]], material: &impl Material, path: P
 
 #[inline(always)]
 fn batches(wi: &[[f64; 3]], wo: &[[f64; 3]], material: &impl Material, out: &mut [[f64; 3]]) {
-    let mut pairs = Pairs([[0.0; BATCH]; 6]);
+    let mut pairs = Pairs([[0.0; BATCH]; 7]);
     let mut room = [[0.0; BATCH]; 4];
     for ((wi, wo), out) in wi.chunks(BATCH).zip(wo.chunks(BATCH)).zip(out.chunks_mut(BATCH)) {
         pairs.set(wi, wo);
@@ -104,8 +102,9 @@ unsafe fn batches_avx512(wi: &[[f64; 3]], wo: &[[f64; 3]], material: &impl Mater
     batches(wi, wo, material, out)
 }
 
-/// The components of a batch of pairs, those of one kind one after the other. After the last pair of all there may be others.
-pub struct Pairs([Batch; 6]);
+/// The components of a batch of pairs, those of one kind one after the other; and what is known of each: see `told`. After the
+/// last pair of all there may be others.
+pub struct Pairs([Batch; 7]);
 
 impl Pairs {
     #[inline(always)]
@@ -116,12 +115,20 @@ impl Pairs {
                 self.0[j + 3][i] = b[j];
             }
         }
+        let [x, y, z, u, v, w, told] = &mut self.0;
+        for i in 0..BATCH {
+            // 0, or NaN
+            let all = (x[i] * 0.0 + y[i] * 0.0 + z[i] * 0.0) + (u[i] * 0.0 + v[i] * 0.0 + w[i] * 0.0);
+            told[i] = all + f64::from(u8::from((z[i] > 0.0) & (w[i] > 0.0)));
+        }
     }
 
-    /// Whether both directions of a pair are above the horizon.
+    /// What is known of a pair without looking at the material: 0 unless both directions are above the horizon; and NaN if any
+    /// component is no finite number. None if it is up to the material.
     #[inline(always)]
-    pub fn above(&self, i: usize) -> bool {
-        (self.0[2][i] > 0.0) & (self.0[5][i] > 0.0)
+    pub fn told(&self, i: usize) -> Option<f64> {
+        let told = self.0[6][i];
+        (told != 1.0).then_some(told)
     }
 
     /// cos θ_i and cos θ_o of a pair.
@@ -182,9 +189,13 @@ fn prefetch(table: &[f64], at: usize) {
     let _ = (table, at);
 }
 
+/// NaN where there is no such entry.
 #[inline(always)]
 fn triple(table: &[f64], entry: usize) -> [f64; 3] {
-    [table[3 * entry], table[3 * entry + 1], table[3 * entry + 2]]
+    match table.get(3 * entry..3 * entry + 3) {
+        Some(&[r, g, b]) => [r, g, b],
+        _ => [f64::NAN; 3],
+    }
 }
 
 #[inline(always)]
@@ -195,7 +206,7 @@ fn fill(pairs: &Pairs, lattice: Lattice, at: &Room, out: &mut [[f64; 3]], get: i
         } else {
             get(at[0][i] as u32 as usize)
         };
-        *value = if pairs.above(i) { found } else { [0.0; 3] };
+        *value = pairs.told(i).map_or(found, |told| [told; 3]);
     }
 }
 
@@ -249,6 +260,7 @@ fn positions_for<const TRILINEAR: bool>(pairs: &Pairs, lattice: Lattice, at: &mu
         let [theta_h, theta_d, phi_d] = pairs.half_diff(i, lattice.reciprocal);
         let u = bins_h * (theta_h * (1.0 / half_pi)).sqrt();
         let (v, w) = (theta_d * (bins_d / half_pi), phi_d * (bins_p / range));
+        let w = if w > 0.0 { w } else { 0.0 }; // where lengths overflow, it is no number
         let bin = |position: f64, bins: f64| position.min(bins - 1.0).floor();
         let cell = bin(w, bins_p) + bins_p * (bin(v, bins_d) + bins_d * bin(u, bins_h));
         let numbers = if TRILINEAR { &[u, v, w][..] } else { &[cell] };

@@ -6,15 +6,42 @@ mod node_lookup;
 mod nodes;
 mod query;
 mod simd;
+mod threads;
 mod train;
 
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind, set_hook};
+
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 use simd::Path;
 
 type Triples<'py> = PyReadonlyArray2<'py, f32>;
+
+/// What every entry point does its work in: a fault of ours becomes an error that Python's own handlers see. PyO3 would make one
+/// that passes by `except Exception`.
+fn guarded<T>(work: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|fault| {
+        let what = text(fault.as_ref());
+        Err(PyRuntimeError::new_err(format!(
+            "the core: expected no fault of its own, found one ({what}); please report it"
+        )))
+    })
+}
+
+fn text(fault: &(dyn Any + Send)) -> &str {
+    match (fault.downcast_ref::<String>(), fault.downcast_ref::<&str>()) {
+        (Some(text), _) => text,
+        (_, Some(text)) => text,
+        _ => "which says nothing",
+    }
+}
+
+fn invalid(what: impl Into<String>) -> PyErr {
+    PyValueError::new_err(what.into())
+}
 
 fn matrix<'py, T: numpy::Element + Copy>(py: Python<'py>, rows: Vec<[T; 3]>) -> PyResult<Bound<'py, PyArray2<T>>> {
     rows.as_flattened().to_pyarray(py).reshape([rows.len(), 3])
@@ -28,7 +55,7 @@ fn path_named(name: Option<&str>) -> PyResult<Path> {
     };
     chosen.map(|&(_, path)| path).ok_or_else(|| {
         let known: Vec<_> = available.iter().map(|&(name, _)| name).collect();
-        PyValueError::new_err(format!("simd: expected one of {}, found {}", known.join(", "), name.unwrap_or("none")))
+        invalid(format!("simd: expected one of {}, found {}", known.join(", "), name.unwrap_or("none")))
     })
 }
 
@@ -48,26 +75,31 @@ impl Learner {
         search: &str,
         simd: Option<&str>,
     ) -> PyResult<Self> {
-        let (triples, weights) = (rows(&triples, "triples")?.to_vec(), rows(&weights, "weights")?);
-        let cells = cells.as_slice()?.to_vec();
-        if weights.is_empty() || columns == 0 || cells.len() != triples.len() {
-            return Err(PyValueError::new_err("expected at least one unit and column, and as many cells as triples"));
-        }
-        let mut learner = train::Learner::new(triples, cells, weights);
-        learner.columns = columns;
-        learner.path = path_named(simd)?;
-        learner.rule = match rule {
-            "paper" => train::Rule::Paper,
-            "kohonen" => train::Rule::Kohonen,
-            _ => return Err(PyValueError::new_err(format!("rule: expected paper or kohonen, found {rule}"))),
-        };
-        learner.search = match search {
-            "boxes" => train::Search::Boxes,
-            "all" => train::Search::All,
-            "scalar" => train::Search::Scalar,
-            _ => return Err(PyValueError::new_err(format!("search: expected boxes, all or scalar, found {search}"))),
-        };
-        Ok(Learner(learner))
+        guarded(|| {
+            let (triples, weights) = (rows(&triples, "triples")?, rows(&weights, "weights")?);
+            let cells = line(&cells, "cells")?;
+            if weights.is_empty() || columns == 0 || cells.len() != triples.len() {
+                return Err(invalid("expected at least one unit and column, and as many cells as triples"));
+            }
+            // Steps toward such triples stay among them, and no distance overflows.
+            shares(triples.as_flattened(), "triples")?;
+            shares(weights.as_flattened(), "weights")?;
+            let mut learner = train::Learner::new(triples.to_vec(), cells.to_vec(), weights);
+            learner.columns = columns;
+            learner.path = path_named(simd)?;
+            learner.rule = match rule {
+                "paper" => train::Rule::Paper,
+                "kohonen" => train::Rule::Kohonen,
+                _ => return Err(invalid(format!("rule: expected paper or kohonen, found {rule}"))),
+            };
+            learner.search = match search {
+                "boxes" => train::Search::Boxes,
+                "all" => train::Search::All,
+                "scalar" => train::Search::Scalar,
+                _ => return Err(invalid(format!("search: expected boxes, all or scalar, found {search}"))),
+            };
+            Ok(Learner(learner))
+        })
     }
 
     fn present(
@@ -78,25 +110,29 @@ impl Learner {
         alpha: f32,
         falloff: PyReadonlyArray1<f32>,
     ) -> PyResult<f64> {
-        let falloff = falloff.as_slice()?;
-        if falloff.is_empty() || start > stop || stop > self.0.len() {
-            return Err(PyValueError::new_err("expected a falloff, and a range within the triples"));
-        }
-        let epoch = train::Epoch { alpha, falloff };
-        let learner = &mut self.0;
-        Ok(py.detach(|| learner.present(start..stop, &epoch)))
+        guarded(|| {
+            let falloff = line(&falloff, "falloff")?;
+            if falloff.is_empty() || start > stop || stop > self.0.len() {
+                return Err(invalid("expected a falloff, and a range within the triples"));
+            }
+            shares(&[alpha], "alpha")?;
+            shares(falloff, "falloff")?;
+            let epoch = train::Epoch { alpha, falloff };
+            let learner = &mut self.0;
+            Ok(py.detach(|| learner.present(start..stop, &epoch)))
+        })
     }
 
-    fn settled(&mut self) -> bool {
-        self.0.settled()
+    fn settled(&mut self) -> PyResult<bool> {
+        guarded(|| Ok(self.0.settled()))
     }
 
     fn weights<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        matrix(py, self.0.weights())
+        guarded(|| matrix(py, self.0.weights()))
     }
 
     fn stored_cells<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        matrix(py, self.0.stored_cells())
+        guarded(|| matrix(py, self.0.stored_cells()))
     }
 }
 
@@ -107,33 +143,54 @@ struct Palette(query::Palette);
 impl Palette {
     #[new]
     #[pyo3(signature = (lut, search = "boxes", simd = None, threads = None))]
-    fn new(lut: Triples, search: &str, simd: Option<&str>, threads: Option<usize>) -> PyResult<Self> {
-        let lut = rows(&lut, "lut")?;
-        if lut.is_empty() || !["boxes", "all"].contains(&search) {
-            return Err(PyValueError::new_err("lut: expected at least one entry, and a search in boxes or all"));
-        }
-        Ok(Palette(query::Palette::new(lut, search == "boxes", path_named(simd)?, threads_or_all(threads))))
+    fn new(py: Python, lut: Triples, search: &str, simd: Option<&str>, threads: Option<usize>) -> PyResult<Self> {
+        guarded(|| {
+            let lut = rows(&lut, "lut")?;
+            if lut.is_empty() || !["boxes", "all"].contains(&search) {
+                return Err(invalid("lut: expected at least one entry, and a search in boxes or all"));
+            }
+            moderate(lut.as_flattened(), "lut")?;
+            let threads = threads::allowed(py, threads)?;
+            Ok(Palette(query::Palette::new(lut, search == "boxes", path_named(simd)?, threads)))
+        })
     }
 
     fn query<'py>(&self, py: Python<'py>, triples: Triples<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
-        let triples = rows(&triples, "triples")?;
-        let found = PyArray1::zeros(py, triples.len(), false);
-        {
-            let mut out = found.try_readwrite()?;
-            let out = out.as_slice_mut()?;
-            py.detach(|| self.0.query(triples, out));
-        }
-        Ok(found)
+        guarded(|| {
+            let triples = rows(&triples, "triples")?;
+            moderate(triples.as_flattened(), "triples")?;
+            let found = PyArray1::zeros(py, triples.len(), false);
+            {
+                let mut out = found.try_readwrite()?;
+                let out = out.as_slice_mut()?;
+                py.detach(|| self.0.query(triples, out));
+            }
+            Ok(found)
+        })
     }
+}
+
+/// Refuses what is no number, and numbers so large that distances may overflow: nothing is nearest then.
+fn moderate(numbers: &[f32], name: &str) -> PyResult<()> {
+    const MOST: f32 = 1e18;
+    if !numbers.iter().all(|x| x.abs() <= MOST) {
+        return Err(invalid(format!("{name}: expected numbers up to {MOST:e}, found others")));
+    }
+    Ok(())
+}
+
+/// Refuses what is not from 0 to 1.
+fn shares(numbers: &[f32], name: &str) -> PyResult<()> {
+    if !numbers.iter().all(|x| (0.0..=1.0).contains(x)) {
+        return Err(invalid(format!("{name}: expected numbers from 0 to 1, found others")));
+    }
+    Ok(())
 }
 
 /// Rows of three numbers each; borrowed where they lie one after the other.
 fn rows<'a, T: numpy::Element>(array: &'a PyReadonlyArray2<T>, name: &str) -> PyResult<&'a [[T; 3]]> {
     if array.shape()[1] != 3 || !array.is_c_contiguous() {
-        return Err(PyValueError::new_err(format!(
-            "{name}: expected rows of 3 in one piece, found {:?}",
-            array.shape()
-        )));
+        return Err(invalid(format!("{name}: expected rows of 3 in one piece, found {:?}", array.shape())));
     }
     Ok(array.as_slice()?.as_chunks::<3>().0)
 }
@@ -159,32 +216,47 @@ fn lookup<'py>(
     simd: Option<&str>,
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let volume = match &index {
-        None => Volume::Values,
-        Some(array) => match array.extract::<PyReadonlyArray1<u8>>() {
-            Ok(index) => Volume::Index8(index),
-            Err(_) => Volume::Index16(array.extract()?),
-        },
-    };
-    let values = values.as_slice()?;
-    let cells = match &volume {
-        Volume::Values => eval::Cells::Values(values),
-        Volume::Index8(index) => eval::Cells::Index8(index.as_slice()?, values),
-        Volume::Index16(index) => eval::Cells::Index16(index.as_slice()?, values),
-    };
-    let (wi, wo) = (rows(&wi, "wi")?, rows(&wo, "wo")?);
-    if wi.len() != wo.len() || bins.contains(&0) || bins.iter().product::<usize>() != cells.len() {
-        return Err(PyValueError::new_err("expected as many wi as wo, and a value for each cell"));
-    }
-    let material = eval::OnLattice { lattice: eval::Lattice { bins, reciprocal, trilinear }, cells };
-    let path = path_named(simd)?;
-    let threads = threads_or_all(threads);
-    // SAFETY: `eval` writes every element. NumPy gives large arrays large pages, which calloc's zeros do not get.
-    let found = unsafe { PyArray2::new(py, [wi.len(), 3], false) };
+    guarded(|| {
+        let volume = match &index {
+            None => Volume::Values,
+            Some(array) => match array.extract::<PyReadonlyArray1<u8>>() {
+                Ok(index) => Volume::Index8(index),
+                Err(_) => Volume::Index16(array.extract()?),
+            },
+        };
+        let values = line(&values, "values")?;
+        let cells = match &volume {
+            Volume::Values => eval::Cells::Values(values),
+            Volume::Index8(index) => eval::Cells::Index8(line(index, "index")?, values),
+            Volume::Index16(index) => eval::Cells::Index16(line(index, "index")?, values),
+        };
+        let (wi, wo) = (rows(&wi, "wi")?, rows(&wo, "wo")?);
+        let size = bins.iter().try_fold(1, |size: usize, &n| size.checked_mul(n));
+        // Numbers of cells have 32 bits.
+        let whole = values.len() % 3 == 0 && size.is_some_and(|n| 0 < n && n == cells.len() && n < u32::MAX as usize);
+        if wi.len() != wo.len() || !whole {
+            return Err(invalid("expected as many wi as wo, and a value for each cell"));
+        }
+        let material = eval::OnLattice { lattice: eval::Lattice { bins, reciprocal, trilinear }, cells };
+        evaluated(py, wi.len(), simd, threads, |path, threads, out| eval::eval(wi, wo, &material, path, threads, out))
+    })
+}
+
+/// f_r of pairs of directions: a new array that `write` fills.
+fn evaluated<'py>(
+    py: Python<'py>,
+    pairs: usize,
+    simd: Option<&str>,
+    threads: Option<usize>,
+    write: impl FnOnce(Path, usize, &mut [[f64; 3]]) + Send,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (path, threads) = (path_named(simd)?, threads::allowed(py, threads)?);
+    // SAFETY: `write` writes every element. NumPy gives large arrays large pages, which calloc's zeros do not get.
+    let found = unsafe { PyArray2::new(py, [pairs, 3], false) };
     {
         let mut out = found.try_readwrite()?;
         let (rows, _) = out.as_slice_mut()?.as_chunks_mut::<3>();
-        py.detach(|| eval::eval(wi, wo, &material, path, threads, rows));
+        py.detach(|| write(path, threads, rows));
     }
     Ok(found)
 }
@@ -208,52 +280,39 @@ fn lookup_nodes<'py>(
     simd: Option<&str>,
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (wi, wo) = (rows(&wi, "wi")?, rows(&wo, "wo")?);
-    let nodes = node_lookup::Nodes::new(
-        &small_numbers::<Vec<u8>>(&theta_h, "theta_h")?,
-        &small_numbers::<Vec<u8>>(&band, "band")?,
-        &small_numbers::<Vec<Vec<u8>>>(&theta_d, "theta_d")?,
-        &small_numbers::<Vec<Vec<u8>>>(&phi_d, "phi_d")?,
-    )
-    .ok_or_else(|| {
-        PyValueError::new_err("nodes: expected axes that increase from 0 to 180, and a band for each row")
-    })?;
-    let factors = node_lookup::Factors {
-        gains: line(&gains, "gains")?,
-        shapes: rows(&shapes, "shapes")?,
-        gain: line(&gain, "gain")?,
-        shape: line(&shape, "shape")?,
-    };
-    if wi.len() != wo.len() || !factors.fit(nodes.size) {
-        return Err(PyValueError::new_err("expected as many wi as wo, and a finite gain and shape for each node"));
-    }
-    let path = path_named(simd)?;
-    let threads = threads_or_all(threads);
-    // SAFETY: `eval` writes every element.
-    let found = unsafe { PyArray2::new(py, [wi.len(), 3], false) };
-    {
-        let mut out = found.try_readwrite()?;
-        let (rows, _) = out.as_slice_mut()?.as_chunks_mut::<3>();
-        py.detach(|| {
+    guarded(|| {
+        let (wi, wo) = (rows(&wi, "wi")?, rows(&wo, "wo")?);
+        let nodes = node_lookup::Nodes::new(
+            &small_numbers::<Vec<u8>>(&theta_h, "theta_h")?,
+            &small_numbers::<Vec<u8>>(&band, "band")?,
+            &small_numbers::<Vec<Vec<u8>>>(&theta_d, "theta_d")?,
+            &small_numbers::<Vec<Vec<u8>>>(&phi_d, "phi_d")?,
+        )
+        .ok_or_else(|| invalid("nodes: expected axes that increase from 0 to 180, and a band for each row"))?;
+        let factors = node_lookup::Factors {
+            gains: line(&gains, "gains")?,
+            shapes: rows(&shapes, "shapes")?,
+            gain: line(&gain, "gain")?,
+            shape: line(&shape, "shape")?,
+        };
+        if wi.len() != wo.len() || !factors.fit(nodes.size) || !scale.is_finite() {
+            return Err(invalid("expected as many wi as wo, and a finite gain, shape and scale for each node"));
+        }
+        evaluated(py, wi.len(), simd, threads, |path, threads, out| {
             let material = node_lookup::OnNodes::new(&nodes, factors, scale, wi.len());
-            eval::eval(wi, wo, &material, path, threads, rows)
-        });
-    }
-    Ok(found)
+            eval::eval(wi, wo, &material, path, threads, out)
+        })
+    })
 }
 
 /// Whole numbers of a byte each, or lists of such.
 fn small_numbers<'py, T: FromPyObjectOwned<'py>>(numbers: &Bound<'py, PyAny>, name: &str) -> PyResult<T> {
-    numbers.extract().map_err(|_| PyValueError::new_err(format!("{name}: expected whole numbers from 0 to 180")))
+    numbers.extract().map_err(|_| invalid(format!("{name}: expected whole numbers from 0 to 180")))
 }
 
 /// Numbers that lie one after the other.
 fn line<'a, T: numpy::Element>(array: &'a PyReadonlyArray1<T>, name: &str) -> PyResult<&'a [T]> {
-    array.as_slice().map_err(|_| PyValueError::new_err(format!("{name}: expected numbers in one piece")))
-}
-
-fn threads_or_all(threads: Option<usize>) -> usize {
-    threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()))
+    array.as_slice().map_err(|_| invalid(format!("{name}: expected numbers in one piece")))
 }
 
 #[pyfunction]
@@ -263,6 +322,7 @@ fn simd_paths() -> Vec<&'static str> {
 
 #[pymodule]
 fn _core(module: &Bound<PyModule>) -> PyResult<()> {
+    set_hook(Box::new(|_| {})); // of this library's own faults, which `guarded` tells
     module.add("STORED", train::STORED)?;
     module.add("EMPTY", train::EMPTY)?;
     module.add_class::<Learner>()?;

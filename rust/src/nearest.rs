@@ -36,6 +36,8 @@ pub struct Codebook {
     slot: Vec<u32>,
     /// Lower and upper bounds of sixteen boxes at a time.
     boxes: Vec<[[Line; 3]; 2]>,
+    /// Whether slots are other than entries' numbers.
+    rearranged: bool,
 }
 
 const FAR: Line = Line([f32::INFINITY; 16]);
@@ -43,10 +45,23 @@ const FAR: Line = Line([f32::INFINITY; 16]);
 impl Codebook {
     /// In the order given, for `nearest_of_all`; `rearrange` makes boxes tight, for `nearest`.
     pub fn new(entries: &[[f32; 3]]) -> Self {
-        let mut codebook = Codebook { blocks: vec![], entry: vec![], slot: vec![0; entries.len()], boxes: vec![] };
-        let numbers: Vec<u32> = (0..entries.len() as u32).collect();
-        codebook.fill(entries, &numbers.chunks(16).map(<[u32]>::to_vec).collect::<Vec<_>>());
+        let slot = vec![0; entries.len()];
+        let mut codebook = Codebook { blocks: vec![], entry: vec![], slot, boxes: vec![], rearranged: false };
+        codebook.fill_in_order(entries);
         codebook
+    }
+
+    /// Back to the first order.
+    pub fn order(&mut self) {
+        if self.rearranged {
+            self.rearranged = false;
+            self.fill_in_order(&self.entries());
+        }
+    }
+
+    fn fill_in_order(&mut self, entries: &[[f32; 3]]) {
+        let numbers: Vec<u32> = (0..entries.len() as u32).collect();
+        self.fill(entries, &numbers.chunks(16).map(<[u32]>::to_vec).collect::<Vec<_>>());
     }
 
     pub fn len(&self) -> usize {
@@ -93,6 +108,7 @@ impl Codebook {
         let mut numbers: Vec<u32> = (0..entries.len() as u32).collect();
         let mut leaves = vec![];
         split(&mut numbers, &entries, &mut leaves);
+        self.rearranged = true;
         self.fill(&entries, &leaves);
     }
 

@@ -175,11 +175,13 @@ impl<'a> OnNodes<'a> {
         value: impl Fn(usize) -> [f64; 4],
     ) {
         for i in 0..BATCH.min(out.len() / 3) {
-            let mut f_r = [0.0; 4];
-            if pairs.above(i) {
-                let y = self.nodes.blend([0, 1, 2].map(|c| at[c][i]), steps.map(|step| step[i]), &value);
-                f_r = y.map(|y| if y > 0.0 { y * y * y * at[3][i] } else { 0.0 });
-            }
+            let f_r = match pairs.told(i) {
+                Some(told) => [told; 4],
+                None => {
+                    let y = self.nodes.blend([0, 1, 2].map(|c| at[c][i]), steps.map(|step| step[i]), &value);
+                    y.map(|y| if y > 0.0 { y * y * y * at[3][i] } else { 0.0 })
+                }
+            };
             match out.get_mut(3 * i..3 * i + 4) {
                 Some(four) => four.copy_from_slice(&f_r), // in one piece; the next pair writes over the fourth
                 None => out[3 * i..].copy_from_slice(&f_r[..3]),

@@ -2,6 +2,10 @@
 
 use crate::nearest::Codebook;
 use crate::simd::{Path, Portable, Simd};
+use crate::threads::share_out;
+
+/// Fewer triples are not worth a thread.
+const LEAST: usize = 256;
 
 pub struct Palette {
     lut: Codebook,
@@ -21,12 +25,9 @@ impl Palette {
 
     /// Writes the nearest entry, the lowest of several, of each triple.
     pub fn query(&self, triples: &[[f32; 3]], found: &mut [u32]) {
-        let share = triples.len().div_ceil(self.threads).max(1);
-        std::thread::scope(|scope| {
-            for (part, out) in triples.chunks(share).zip(found.chunks_mut(share)) {
-                scope.spawn(|| self.query_part(part, out));
-            }
-        });
+        let share = triples.len().div_ceil(self.threads).max(LEAST);
+        let parts = triples.chunks(share).zip(found.chunks_mut(share));
+        share_out(parts, self.threads, |(part, out)| self.query_part(part, out));
     }
 
     fn query_part(&self, triples: &[[f32; 3]], found: &mut [u32]) {

@@ -110,6 +110,8 @@ impl Learner {
     pub fn present(&mut self, range: std::ops::Range<usize>, epoch: &Epoch) -> f64 {
         if self.search == Search::Boxes && epoch.falloff.len() == 1 {
             self.weights.rearrange();
+        } else {
+            self.weights.order();
         }
         // SAFETY: a path is only ever one that this processor has.
         unsafe {

@@ -240,10 +240,10 @@ CELLS = (3, 2, 3, 1, 0, 3)
 @pytest.mark.parametrize(
     ("head", "what"),
     [
-        ((0, 2, 3, 1, 0, 3), "at least one bin"),
-        ((3, 2, 0, 1, 0, 3), "at least one bin"),
-        ((65535, 65535, 65535, 1, 0, 3), "at most"),
-        ((2048, 2049, 1, 1, 0, 3), "at most"),
+        ((0, 2, 3, 1, 0, 3), "lattice of 1 to"),
+        ((3, 2, 0, 1, 0, 3), "lattice of 1 to"),
+        ((65535, 65535, 65535, 1, 0, 3), "lattice of 1 to"),
+        ((2048, 2049, 1, 1, 0, 3), "lattice of 1 to"),
         ((3, 2, 3, 2, 0, 3), "flags"),
         ((3, 2, 3, 1, 2, 3), "flags"),
         ((3, 2, 3, 1, 0, 0), "LUT"),
@@ -302,6 +302,7 @@ def test_a_bomb_stops_at_the_size_that_the_head_says():
     "notes",
     [
         *(b"[]", b"null", b"3", b"{", b"\xff\xfe", b"{}x", b"[" * 30000, b'{"a":' * 9000),
+        *(b'{"a":' * 33 + b"1" + b"}" * 33, b'{"a":1e999}', b'{"a":' + b"9" * 400 + b"}", b'{"options":null}'),
         *(b'{"options":3}', b'{"metrics":[]}', b'{"metrics":{"rmse":NaN}}', b'{"metrics":{"rmse":-Infinity}}'),
         '{"options":{}}'.encode("utf-16"),
     ],

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from compact import CASES, Writer, broken, material, stream
+from compact import CASES, GOOD, HOSTILE_STREAMS, bomb, broken, material, stream, written
 from helpers import must_fail
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -104,18 +104,18 @@ def test_measured_bits_are_those_of_the_stream(case):
 
 
 def taken(read, data):
-    """What a reader reads, or None if it refuses."""
+    """What a reader reads, or what it says if it refuses."""
     try:
         return read(data)
-    except (FormatError, ValueError):
-        return None
+    except (FormatError, ValueError) as error:
+        return str(error)
 
 
 def check_taken_or_refused(data, read=core):
     """Both readers agree; and a stream that is taken is the only one that holds what is in it."""
     found = taken(read, data)
     assert found == taken(reference_codec.decode, data)
-    if found:
+    if not isinstance(found, str):
         again = _core.NodePalette(*found[:6]).encode(*(np.array(index, np.uint16) for index in found[6:]))
         assert again == data
 
@@ -140,8 +140,8 @@ def test_nothing_follows(small):
     for case in CASES:
         data = stream(encode(material(case)))[0]
         for zeros in range(1, 9):
-            assert taken(core, data + bytes(zeros)) is None
-        assert taken(core, data + b"\xff" * 9) is None
+            assert isinstance(taken(core, data + bytes(zeros)), str)
+        assert isinstance(taken(core, data + b"\xff" * 9), str)
     for byte in range(256):
         check_taken_or_refused(small + bytes([byte]))
         check_taken_or_refused(small[:-1] + bytes([byte]))
@@ -162,53 +162,6 @@ def test_any_material(seed, bands, inner, manner):
         check_reads(read, data, made)
 
 
-def written(bands=1, theta_h=(0,), rows=(), axes=((0,), (0,)), gains=1, shapes=1, palette=()):
-    """A stream that starts with such numbers: bands; inner nodes and steps of θ_h; rows of bands; inner nodes and steps
-    of θ_d and φ_d; numbers of gains and shapes; codes, with numbers of contexts."""
-    writer = Writer()
-    counts, *steps = ([2048] * 24 for _ in range(4))
-    writer.number(bands - 1, counts)
-    for number in (axis := iter(theta_h)):
-        writer.number(number, counts)
-        for step in axis:
-            writer.number(step, steps[0])
-    for number in rows:
-        writer.number(number - 1, counts)
-    for i, (inner, *places) in enumerate(axes):
-        writer.number(inner, counts)
-        for step in places:
-            writer.number(step, steps[1 + i % 2])
-    counts, *steps = ([2048] * 24 for _ in range(4))
-    writer.number(gains - 1, counts)
-    writer.number(shapes - 1, counts)
-    for number, context in palette:
-        writer.number(number, steps[context])
-    return writer.finish()
-
-
-FULL = [64, *[0] * 64]
-GOOD = [(4095, 0), (0, 1), (0, 2)]
-HOSTILE = {
-    "bands": {"bands": 17},
-    "bands-2": {"bands": 2**21 - 1},
-    "axis": {"theta_h": [1, 179]},
-    "axis-2": {"theta_h": [180, *[0] * 180]},
-    "axis-3": {"theta_h": [2**21 - 2, *[0] * 180]},
-    "axis-4": {"theta_h": [1, 2**21 - 2]},
-    "band": {"bands": 2, "rows": [3]},
-    "band-2": {"bands": 2, "rows": [2]},
-    "band-3": {"bands": 3, "rows": [2]},
-    "nodes": {"theta_h": [62, *[0] * 62], "axes": (FULL, FULL)},
-    "gains": {"gains": 1025},
-    "shapes": {"shapes": 1025},
-    "gain": {"palette": [(4096, 0)]},
-    "gain-2": {"gains": 2, "palette": [(4095, 0), (0, 0)]},
-    "shape": {"palette": [(4095, 0), (2049, 1)]},
-    "shape-2": {"palette": [(4095, 0), (0, 1), (2049, 2)]},
-    "shape-3": {"palette": [(4095, 0), (0, 1), (2050, 2)]},
-}
-
-
 def complaint_of(read, data):
     try:
         read(data)
@@ -218,14 +171,46 @@ def complaint_of(read, data):
 
 
 def check_refused(data, what):
-    for read in (core, reference_codec.decode):
-        assert f"{what}:" in complaint_of(read, data)
+    one, other = (complaint_of(read, data) for read in (core, reference_codec.decode))
+    assert f"{what}:" in one
+    assert one == other
 
 
-@pytest.mark.parametrize("name", HOSTILE)
+@pytest.mark.parametrize("name", HOSTILE_STREAMS)
 def test_hostile_numbers(name):
-    check_refused(written(**HOSTILE[name]), name.split("-")[0])
+    check_refused(written(**HOSTILE_STREAMS[name]), name.split("-")[0])
     must_fail(check_refused, written(palette=GOOD), name.split("-")[0])
+
+
+def test_a_bomb_is_refused():
+    """It does not keep a reader busy: a few bytes may mean no more than some millions of entries within reach."""
+    data = bomb()
+    assert len(data) < 100
+    check_refused(data, "entries within reach")
+    assert complaint_of(core, data).endswith(f"expected at most {2**22 + 2**11 * len(data)}, found more")
+
+
+def any_entries(entries):
+    """As many nodes as there can be, with any of so many gains and shapes."""
+    rng = np.random.default_rng(entries)
+    axes = [*range(31), 180], [0] * 32, [[*range(63), 180]], [[*range(64)]]
+    made = _core.NodePalette(*axes, list(range(entries)), [[i, 0] for i in range(entries)])
+    return made, rng.integers(0, entries, (2, 2**17)).astype(np.uint16)
+
+
+def check_not_too_much(entries):
+    made, indices = any_entries(entries)
+    complaint = complaint_of(lambda each: _core.NodePalette.decode(made.encode(*each)), indices)
+    assert complaint == ""
+
+
+def test_no_more_is_written_than_is_read():
+    check_not_too_much(256)
+    must_fail(check_not_too_much, 257)
+    made, indices = any_entries(300)
+    made.measure(*indices)
+    with pytest.raises(ValueError, match=f"^entries within reach: expected at most {2**26}, found more$"):
+        made.encode(*indices)
 
 
 @pytest.mark.parametrize(
@@ -241,7 +226,7 @@ def test_hostile_numbers(name):
 )
 def test_numbers_at_their_bounds(what, numbers):
     """Whatever is wrong with the stream, it is not these."""
-    assert what in {name.split("-")[0] for name in HOSTILE}
+    assert what in {name.split("-")[0] for name in HOSTILE_STREAMS}
     assert f"{what}:" not in complaint_of(core, written(**numbers))
 
 

@@ -129,3 +129,53 @@ def test_that_check_notices_the_higher_of_two_alike():
             return 39 - super().query(triples)
 
     must_fail(check_query, Higher(lut[::-1].copy()), lut, lut)
+
+
+def turns(rng, cells):
+    """Some epochs of a learner: start, stop, α, falloff. Neighbourhoods shrink, as in training, or come again."""
+    sigmas = np.array([2.5, 0.0, 1.2, 0.0, 0.0, 0.7, 3.0, 0.0])
+    if rng.random() < 0.5:
+        sigmas = np.sort(sigmas)[::-1]
+    for epoch, sigma in enumerate(sigmas):
+        falloff = train._falloff(float(sigma))
+        for start in range(0, cells, step := int(rng.integers(1, cells + 1))):
+            yield start, min(start + step, cells), float(np.float32(0.3 * 0.8**epoch)), falloff
+
+
+def check_every_step(one, other, steps):
+    """The errors, the weights and what is stored after each."""
+    for step in steps:
+        assert one.present(*step) == other.present(*step)
+        assert one.weights().tobytes() == other.weights().tobytes()
+        assert one.stored_cells().tobytes() == other.stored_cells().tobytes()
+    assert one.settled() == other.settled()
+
+
+def wandering(seed, clusters, rule, columns):
+    """Few cells, many of them alike, and weights to begin with."""
+    rng = np.random.default_rng(seed)
+    x = (rng.random((60, 3)) ** rng.integers(1, 6)).astype(np.float32)
+    x[rng.integers(0, 60, 12)] = x[0]
+    weights = rng.choice(x, clusters)  # some of them alike
+    return rng, (x, np.arange(60, dtype=np.uint32), weights, rule, columns)
+
+
+@pytest.mark.parametrize("simd", _core.simd_paths())
+@pytest.mark.parametrize("columns", [1, 5, 17, 64])
+@pytest.mark.parametrize("rule", ["paper", "kohonen"])
+def test_neighbourhoods_that_change_leave_the_search_exact(rule, columns, simd):
+    """Boxes after units have moved with their neighbours, and the other way round: as by brute force, step by step."""
+    for seed, clusters in itertools.product(range(4), (17, 40, 64)):
+        rng, setting = wandering(seed, clusters, rule, columns)
+        steps = list(turns(rng, 60))
+        check_every_step(_core.Learner(*setting, "boxes", simd), _core.Learner(*setting, "scalar", "portable"), steps)
+        if seed == 0 and clusters == 40 and simd == "portable":
+            check_every_step(_core.Learner(*setting), reference.Learner(*setting), steps)
+
+
+def test_that_check_notices_another_step():
+    rng, setting = wandering(0, 40, "kohonen", 5)
+    steps = list(turns(rng, 60))
+    learner = _core.Learner(*setting)
+    learner.present(0, 1, 0.5, np.ones(1, np.float32))
+    must_fail(check_every_step, learner, _core.Learner(*setting), steps)

@@ -6,15 +6,17 @@ import struct
 import subprocess
 from importlib.resources import files
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from compact import CASES, arrays, broken, material, sealed
+from compact import CASES, HOSTILE_STREAMS, arrays, bomb, broken, material, sealed, stream, written
 from helpers import must_fail, tool
 
 from sommerl import Lattice, SomManBrdf
 from sommerl.container import PREFIX
 from sommerl.errors import FormatError
+from sommerl.som_man import file, reference_codec
 from sommerl.som_man.file import decode, encode
 
 GOLDEN = Path(__file__).parents[1] / "golden"
@@ -33,7 +35,7 @@ for (let at = 0; at < bytes.length; ) {
         for (const key of ["lut", "index", "gains", "gainIndex"]) material[key] &&= hex(material[key]);
         found.push(material);
     } catch (error) {
-        found.push(error.constructor === RangeError ? String(error.stack) : null);
+        found.push(error.constructor === Error ? error.message : String(error.stack));
     }
 }
 fs.writeFileSync(1, JSON.stringify(found));
@@ -51,7 +53,7 @@ def cells(entries, lattice, interpolation="nearest"):
 
 @pytest.fixture(scope="module")
 def node(tmp_path_factory):
-    """Runs the decoder on the bytes of files: what it finds, None where it refuses."""
+    """Runs the decoder on the bytes of files: what it finds, or what it says where it refuses."""
     folder = tmp_path_factory.mktemp("js")
     for name in ("smrl.js", "nodes.js"):
         shutil.copy(str(files("sommerl") / "viewer" / name), folder)
@@ -60,9 +62,8 @@ def node(tmp_path_factory):
 
     def run(contents):
         given = b"".join(struct.pack("<I", len(data)) + data for data in contents)
-        return json.loads(
-            subprocess.run([tool("node"), folder / "main.js"], input=given, capture_output=True, check=True).stdout
-        )
+        done = subprocess.run([tool("node"), folder / "main.js"], input=given, capture_output=True, check=True)
+        return json.loads(done.stdout, parse_int=float)  # JavaScript has but one kind of numbers
 
     return run
 
@@ -97,23 +98,118 @@ def test_the_same_numbers_bit_for_bit(node):
     must_fail(check_same, found, list(map(described, made)))
 
 
-def described_or_none(data):
+def read(data):
+    """What Python finds in the bytes of a file, or what it says where it refuses."""
     try:
         return described(decode(data))
-    except FormatError:
-        return None
+    except FormatError as error:
+        return str(error)
 
 
-@pytest.mark.parametrize(
-    "made", [cells(3, Lattice(2, 2, 3)), material((2, 1, 3, 3, "walk"), 4)], ids=["cells", "nodes"]
-)
-def test_it_refuses_what_python_refuses(node, made):
+def read_plainly(data):
+    """The same with the decoder of streams in plain Python."""
+
+    def decoded(stream):
+        *axes, gains, shapes, gain, shape = reference_codec.decode(stream)
+        names = ("theta_h", "band", "theta_d", "phi_d", "gains", "shapes")
+        palette = SimpleNamespace(**dict(zip(names, (*axes, gains, shapes), strict=True)))
+        return palette, tuple(np.array(index, np.uint16) for index in (gain, shape))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(file, "_core", SimpleNamespace(NodePalette=SimpleNamespace(decode=decoded)))
+        return read(data)
+
+
+def mutated(body, count, seed):
+    """Contents with a few bytes changed anywhere, some of them cut off."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        each = bytearray(body)
+        for at in rng.integers(0, len(body), rng.integers(1, 5)):
+            each[at] = rng.integers(0, 256)
+        yield bytes(each[: rng.integers(1, len(each) + 1) if rng.random() < 0.2 else None])
+
+
+def noted(notes, made):
+    """A file with such notes, whose text may be anything."""
+    made.options, made.metrics = {}, {}
+    body = encode(made)[PREFIX.size :]
+    at = 2 + body[1] + 1 + body[2 + body[1]]
+    return sealed(body[:at] + struct.pack("<H", len(notes)) + notes + body[at + 2 :])
+
+
+NOTES = [
+    *(
+        b"{}",
+        b"[]",
+        b"null",
+        b"3",
+        b"{",
+        b"\xff\xfe",
+        b"{}x",
+        b"[" * 30000,
+        b'{"a":' * 9000,
+        b"\xef\xbb\xbf{}",
+        b" {} ",
+    ),
+    *(
+        b'{"a":1e999}',
+        b'{"a":' + b"9" * 400 + b"}",
+        b'{"a":' + b"9" * 5000 + b"}",
+        b'{"a":1e-999}',
+        b'{"a":-0.0}',
+        b'{"a":01}',
+    ),
+    *(
+        b'{"options":null}',
+        b'{"options":3}',
+        b'{"metrics":[]}',
+        b'{"metrics":{"x":NaN}}',
+        b'{"metrics":{"x":-Infinity}}',
+    ),
+    *(b'{"a":' * n + b"1" + b"}" * n for n in (32, 33)),
+    *(b'{"a":' + b"[" * n + b"]" * n + b"}" for n in (31, 32, 5000)),
+    *(
+        b'{"a":"\t"}',
+        rb'{"a":"\ud800"}',
+        rb'{"a":"\u00e9"}',
+        b'{"a":1,"a":{}}',
+        b'{"__proto__":{"options":3}}',
+        b"{'a':1}",
+    ),
+]
+
+
+@pytest.mark.parametrize("kind", ["cells", "nodes"])
+def test_all_decoders_find_the_same_or_say_the_same(node, kind):
+    made = cells(3, Lattice(2, 2, 3)) if kind == "cells" else material((2, 1, 3, 3, "walk"), 4)
     data = encode(made)
     body = data[PREFIX.size :]
-    contents = [data[:-1], data + b"\0", b"", data[:20], *(sealed(body, version) for version in (0, 2, 65535))]
+    contents = [data[:-1], data + b"\0", b"", data[:20], data[:6], bytes(40)]
+    contents += [sealed(body, version) for version in (0, 2, 65535)]
     contents += [sealed(body + more) for more in (b"\0", b"\0\0", b"\xff" * 9)]
-    assert all(described_or_none(each) is None for each in contents)
-    contents += map(sealed, broken(body))
-    found, wanted = node(contents), list(map(described_or_none, contents))
+    contents += [noted(notes, made) for notes in NOTES]
+    contents += map(sealed, (*broken(body), *mutated(body, 800, 1)))
+    if kind == "nodes":
+        stream_, head = stream(data)
+        streams = [written(**numbers) for numbers in HOSTILE_STREAMS.values()]
+        contents += [sealed(head + each) for each in (*streams, *mutated(stream_, 400, 2))]
+        contents += [sealed(head[:-4] + struct.pack("<f", scale) + stream_) for scale in (0, -1, np.nan, np.inf, 1e-45)]
+    found, wanted = node(contents), list(map(read, contents))
     check_same(found, wanted)
+    if kind == "nodes":
+        check_same(list(map(read_plainly, contents)), wanted)
+        check_same(node([sealed(head + bomb())]), [read(sealed(head + bomb()))])
+    assert all(isinstance(each, str) and "\n" not in each for each in wanted[:12])
+    assert len({each for each in wanted if isinstance(each, str)}) > 12
     must_fail(check_same, found, [described(made), *wanted[1:]])
+    must_fail(check_same, found, [f"{wanted[0]}.", *wanted[1:]])
+
+
+def test_no_file_is_longer(node, tmp_path):
+    length = file.LONGEST_FILE + 1
+    path = tmp_path / "long.smrl"
+    path.write_bytes(bytes(length))
+    with pytest.raises(FormatError, match=f"expected at most {length - 1} bytes, found {length}"):
+        file.load(path)
+    assert node([bytes(length)]) == [f"expected at most {length - 1} bytes, found {length}"]

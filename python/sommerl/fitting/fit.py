@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from .. import jit
 from ..brdf import Brdf
 from ..models.multi_lobe import MultiLobe
 from .data import samples_of
@@ -95,8 +96,9 @@ def fit_models(
                 progress(len(found) * steps + done, len(models) * steps)
 
         started = time.perf_counter()
-        search = Search(families, samples, options)
-        best, ends = search.run(advance)
+        with jit.limited():
+            search = Search(families, samples, options)
+            best, ends = search.run(advance)
         found.append(
             Fit(
                 model,

@@ -21,6 +21,7 @@ from ..lattice import MERL, Lattice
 from ..metrics import LOG_FLOOR
 from ..optional import optional
 from ..table import BrdfTable
+from ..threads import limit
 
 NEIGHBOURS = 16
 RIDGE = 1e-3  # keeps the planes flat where neighbours leave their slope open
@@ -166,7 +167,7 @@ def _planes(
 ) -> NDArray[np.float64]:
     """At each wanted point, the height of the plane fitted to its neighbours."""
     with undisturbed():  # SciPy would leave its threads behind, at work on arrays that are gone
-        found: tuple[NDArray[np.float64], NDArray[np.intp]] = tree.query(wanted, NEIGHBOURS, workers=-1)
+        found: tuple[NDArray[np.float64], NDArray[np.intp]] = tree.query(wanted, NEIGHBOURS, workers=limit() or -1)
     distance, nearest = found
     reach = distance[:, -1:] * (1 + 1e-6) + 1e-12
     weight = (1 - (distance / reach) ** 3) ** 3
@@ -184,7 +185,7 @@ def _near(samples: Samples, wi: Triple, wo: Triple) -> NDArray[np.bool_]:
     known = _coordinates(split(samples.wi), split(samples.wo), root=False)
     tree, wanted = _tree(known), _coordinates(wi, wo, root=False)
     with undisturbed():
-        distance, _ = tree.query(wanted, distance_upper_bound=REACH, workers=-1)
+        distance, _ = tree.query(wanted, distance_upper_bound=REACH, workers=limit() or -1)
     return np.isfinite(distance)
 
 

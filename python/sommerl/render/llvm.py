@@ -32,8 +32,7 @@ def mitsuba(variant: str | None = None) -> Any:
         with undisturbed():
             mi.set_variant(variant or _fastest(mi))
             dr = jit.drjit()
-            if dr.thread_count() < 2:
-                dr.set_thread_count(2)  # with one, Mitsuba waits for ever when it reads or writes OpenEXR files
+            dr.set_thread_count(max(jit.LEAST_THREADS, dr.thread_count()))
     _check(mi.variant())
     return mi
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import __version__
+from .. import __version__, jit
 from ..interrupt import undisturbed
 from .checkpoint import Checkpoint, Image, State
 from .llvm import drjit, mitsuba
@@ -124,7 +124,7 @@ def _after_each(
     if state.passes:
         yield state
     for number in range(state.passes, len(passes)):
-        with undisturbed():
+        with undisturbed(), jit.limited():
             total = one(passes[number], _seed(seed, number))
         # Not reached after an interruption: of the pass that it came in, Mitsuba may have left out a part.
         state = State(state.images, total if state.total is None else state.total + total, number + 1)

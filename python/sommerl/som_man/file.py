@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import json
 import struct
-import zlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Any, cast
 
@@ -46,6 +46,7 @@ MOST_BINS = 2**16 - 1  # on an axis
 MOST_CELLS = 2**22  # MERL's larger kind of table has 2,916,000
 LONGEST_FILE = 2 * MOST_CELLS + 24 * 2**16 + 2**20
 LONGEST_NOTES = 2**16 - 1
+DEEPEST_NOTES = 32  # objects and lists within each other
 
 
 def looks_like(head: bytes) -> bool:
@@ -68,7 +69,7 @@ def load(path: str | Path) -> SomManBrdf:
 
 def encode(material: SomManBrdf) -> bytes:
     """The bytes of a material file. The same material always gives the same bytes."""
-    notes = _notes(made_from=list(material.made_from), metrics=material.metrics, options=material.options)
+    notes = _written(made_from=list(material.made_from), metrics=material.metrics, options=material.options)
     nodes = isinstance(material.lattice, NodeLattice)
     body = _head(NODES if nodes else CELLS, material.name, material.source_sha256, notes)
     body += _nodes(material) if nodes else _cells(material)
@@ -77,7 +78,7 @@ def encode(material: SomManBrdf) -> bytes:
 
 def head_bytes(name: str, source_sha256: str, made_from: Sequence[Link]) -> int:
     """What a file of nodes holds before the stream [bytes]."""
-    head = _head(NODES, name, source_sha256, _notes(made_from=list(made_from)))
+    head = _head(NODES, name, source_sha256, _written(made_from=list(made_from)))
     return container.PREFIX.size + len(head) + NODES_HEAD.size
 
 
@@ -87,15 +88,17 @@ def _head(kind: int, name: str, source_sha256: str, notes: bytes) -> bytes:
     return BYTE.pack(kind) + container.origin(name, source_sha256) + SHORT.pack(len(notes)) + notes
 
 
-def _notes(**known: Any) -> bytes:
+def _written(**known: Any) -> bytes:
     """What there is to say."""
     notes = {key: value for key, value in known.items() if value}
     if not notes:
         return b""
     try:
-        return json.dumps(notes, sort_keys=True, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
-    except ValueError as error:
+        text = json.dumps(notes, sort_keys=True, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
+    except (ValueError, RecursionError) as error:
         raise FormatError(f"expected notes that JSON can hold, found others ({error})") from error
+    _notes(text)
+    return text
 
 
 def decode(data: bytes) -> SomManBrdf:
@@ -105,7 +108,7 @@ def decode(data: bytes) -> SomManBrdf:
         return _material(reader)
     except FormatError:
         raise
-    except (KeyError, TypeError, ValueError, RecursionError, zlib.error, SommerlError) as error:
+    except (KeyError, TypeError, ValueError, SommerlError) as error:
         raise FormatError(f"expected a material file's header and contents, found others ({error})") from error
 
 
@@ -114,20 +117,38 @@ def _material(reader: Reader) -> SomManBrdf:
     if kind not in (CELLS, NODES):
         raise FormatError(f"expected kind 0 or 1, found {kind}")
     known: dict[str, Any] = reader.origin()
-    notes = _object(json.loads(reader.take(*reader.unpack(SHORT)).decode() or "{}", parse_constant=_finite))
-    known |= {key: _object(notes.get(key, {})) for key in ("options", "metrics")}
-    known["made_from"] = check_chain(notes["made_from"]) if "made_from" in notes else ()
+    known |= _notes(reader.take(*reader.unpack(SHORT)))
     return _from_nodes(reader, known) if kind == NODES else _from_cells(reader, known)
 
 
-def _finite(constant: str) -> None:
-    raise FormatError(f"expected notes that are JSON, whose numbers are finite, found {constant}")
+def _notes(text: bytes) -> dict[str, Any]:
+    """Options and metrics."""
+    try:
+        notes = json.loads(text.decode() or "{}", parse_int=_finite, parse_float=_finite, parse_constant=_finite)
+    except (ValueError, RecursionError):
+        notes = None
+    if isinstance(notes, dict) and _shallow(notes, DEEPEST_NOTES):
+        known = cast("dict[str, Any]", notes)
+        found = {key: known.get(key, {}) for key in ("options", "metrics")}
+        if all(isinstance(value, dict) for value in found.values()):
+            return found | {"made_from": check_chain(known["made_from"]) if "made_from" in known else ()}
+    raise FormatError(
+        f"expected notes of JSON objects, {DEEPEST_NOTES} deep at most, with finite numbers, found others"
+    )
 
 
-def _object(value: Any) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise FormatError(f"expected notes of JSON objects, found {type(value).__name__}")
-    return cast("dict[str, Any]", value)
+def _finite(text: str) -> int | float:
+    if not isfinite(float(text)):
+        raise ValueError(text)
+    return int(text) if text.lstrip("-").isdigit() else float(text)
+
+
+def _shallow(value: Any, deepest: int) -> bool:
+    """Whether no more objects and lists than that lie within each other."""
+    if not isinstance(value, dict | list):
+        return True
+    inner = cast("Iterable[Any]", value.values() if isinstance(value, dict) else value)
+    return deepest > 0 and all(_shallow(each, deepest - 1) for each in inner)
 
 
 def _cells(material: SomManBrdf) -> bytes:
@@ -143,8 +164,11 @@ def _cells(material: SomManBrdf) -> bytes:
 
 def _from_cells(reader: Reader, known: dict[str, Any]) -> SomManBrdf:
     theta_h, theta_d, phi_d, reciprocal, interpolation, clusters = map(int, reader.unpack(CELLS_HEAD))
-    if theta_h * theta_d * phi_d > MOST_CELLS or not 1 <= clusters <= 2**16:
-        raise FormatError(f"expected a lattice of at most {MOST_CELLS} cells and a LUT of at most 65536 entries")
+    size = theta_h * theta_d * phi_d
+    if not 1 <= size <= MOST_CELLS:
+        raise FormatError(f"expected a lattice of 1 to {MOST_CELLS} cells, found {size}")
+    if not 1 <= clusters <= 2**16:
+        raise FormatError(f"expected a LUT of 1 to {2**16} entries, found {clusters}")
     if reciprocal > 1 or interpolation >= len(INTERPOLATIONS):
         raise FormatError(f"expected flags of 0 or 1, found {reciprocal} and {interpolation}")
     lattice = Lattice(theta_h, theta_d, phi_d, bool(reciprocal))
@@ -152,8 +176,13 @@ def _from_cells(reader: Reader, known: dict[str, Any]) -> SomManBrdf:
     entry = np.dtype("<u1" if clusters <= 256 else "<u2")
     payload = container.inflated(reader.rest(), 24 * clusters + entry.itemsize * int(above.sum()))
     lut = np.frombuffer(payload, "<f8", 3 * clusters).reshape(clusters, 3)
+    entries = np.frombuffer(payload, entry, offset=24 * clusters)
+    if not (np.isfinite(lut) & (lut >= 0)).all():
+        raise FormatError("expected LUT entries that are finite and not negative, found others")
+    if entries.max() >= clusters:
+        raise FormatError(f"expected indices below {clusters}, found {entries.max()}")
     index: NDArray[Any] = np.zeros(lattice.shape, entry)
-    index[above] = np.frombuffer(payload, entry, offset=24 * clusters)
+    index[above] = entries
     return SomManBrdf(lut, index, lattice, interpolation=INTERPOLATIONS[interpolation], **known)
 
 
@@ -171,7 +200,12 @@ def _nodes(material: SomManBrdf) -> bytes:
 
 def _from_nodes(reader: Reader, known: dict[str, Any]) -> SomManBrdf:
     (scale,) = reader.unpack(NODES_HEAD)
-    palette, (gain, shape) = _core.NodePalette.decode(reader.rest())
+    if not 0 < scale < np.inf:
+        raise FormatError("expected a positive scale that is finite, found another")
+    try:
+        palette, (gain, shape) = _core.NodePalette.decode(reader.rest())
+    except ValueError as error:
+        raise FormatError(str(error)) from error
     axes = (tuple(map(tuple, axis)) for axis in (palette.theta_d, palette.phi_d))
     lattice = NodeLattice(tuple(palette.theta_h), tuple(palette.band), *axes)
     lut, gains = shape_values(np.array(palette.shapes)), gain_values(np.array(palette.gains))

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..errors import MaterialError
 from ..nodes import NodeLattice
 from ..optional import optional
 from .codes import Codes, Floats, coordinates, gain_codes, gain_values, shape_codes, shape_values
@@ -91,7 +92,10 @@ def quantise(
         if turn < TURNS:
             size = sum(palette.measure(ordered.gain_index, ordered.shape_index)) / 8
         else:
-            stream = palette.encode(ordered.gain_index, ordered.shape_index)
+            try:
+                stream = palette.encode(ordered.gain_index, ordered.shape_index)
+            except ValueError as error:  # it would keep readers busy for too long
+                raise MaterialError(str(error)) from error
             size = len(stream)
             if size <= target:
                 found.append((problem.excess(ordered.values()), ordered, stream))

@@ -15,6 +15,7 @@ LONGEST, CONTEXT = 20, 24
 FINE = 180
 MOST_BANDS, MOST_NODES, MOST_ENTRIES = 16, 2**17, 2**10
 HIGHEST_GAIN, WIDEST_SHAPE = 2**12, 2**10
+MOST_REACHED, REACHED_BY_ANY, REACHED_A_BYTE = 2**26, 2**22, 2**11
 
 Axis = list[int]
 Context = list[int]
@@ -30,6 +31,7 @@ def decode(
     theta_h, band, theta_d, phi_d = lattice = _lattice(coder)
     gains, shapes = _palette(coder)
     model = Model(lattice, gains, shapes)
+    most = min(MOST_REACHED, REACHED_BY_ANY + REACHED_A_BYTE * len(data))
     gain_index: list[int] = []
     shape_index: list[int] = []
     for row, b in enumerate(band):
@@ -39,6 +41,8 @@ def decode(
                 model.expect(d, p)
                 gain = coder.pick(model.gain_weights())
                 shape = coder.pick(model.shape_weights())
+                if model.reached > most:
+                    raise FormatError(f"entries within reach: expected at most {most}, found more")
                 model.learn(d, p, gain, shape)
                 gain_index.append(gain)
                 shape_index.append(shape)

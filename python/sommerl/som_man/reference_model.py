@@ -114,6 +114,11 @@ class Model:
         """The weights of all shapes."""
         return self._shapes.weigh(*self._predictors[1].expected(), *self._predictors[2].expected())
 
+    @property
+    def reached(self) -> int:
+        """Entries of both palettes within reach, added up over all nodes so far."""
+        return self._gains.reached + self._shapes.reached
+
     def learn(self, d: int, p: int, gain: int, shape: int) -> None:
         """What follows for the nodes to come."""
         self._gains.learn(gain)
@@ -172,12 +177,14 @@ class Entries:
         self._steps = [_step(place) for place in first]
         self._counts, self._roots = [1.0] * len(first), [1.0] * len(first)
         self._narrow = 0.5
+        self.reached = 0
 
     def weigh(self, p0: float, s0: float, p1: float, s1: float) -> list[int]:
         """The weights of all entries around an expected place."""
         self._expected = p0, s0, p1, s1
         reach = _ratio(REACH, s0)
         first, end = bisect_left(self._steps, _step(p0 - reach)), bisect_right(self._steps, _step(p0 + reach))
+        self.reached += end - first
         heights = [self._kernels(entry) for entry in range(first, end)]
         near, far = _sum4([near for near, _ in heights]), _sum4([far for _, far in heights])
         self._f, self._g = self._narrow / near, (1.0 - self._narrow) / far

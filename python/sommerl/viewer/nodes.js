@@ -3,6 +3,8 @@
  * decoder are whole ones below 2^53, so that doubles hold them.
  */
 const FINE = 180;
+// Entries within reach, added up over all nodes: what the time grows with.
+const [MOST_REACHED, REACHED_BY_ANY, REACHED_A_BYTE] = [2 ** 26, 2 ** 22, 2 ** 11];
 
 /** {lattice: {thetaH, band, thetaD, phiD}, gainCodes, shapeCodes, gainIndex, index}. Throws an Error. */
 export function readNodes(bytes) {
@@ -14,18 +16,25 @@ export function readNodes(bytes) {
     const gains = new Entries(places[0], places[0].map(() => 0));
     const shapes = new Entries(places[1], places[2]);
     const model = new Model(lattice, places);
+    const { predictors } = model;
+    const most = Math.min(MOST_REACHED, REACHED_BY_ANY + REACHED_A_BYTE * bytes.length);
     const size = band.reduce((sum, b) => sum + thetaD[b].length * phiD[b].length, 0);
     const [gainIndex, index] = [new Uint16Array(size), new Uint16Array(size)];
     for (let row = 0, i = 0; row < band.length; row++) {
         model.begin(row);
         const [width, height] = [phiD[band[row]].length, thetaD[band[row]].length];
         for (let at = 0; at < width * height; at++, i++) {
-            const [gain, first, second] = model.expect(Math.floor(at / width), at % width);
-            gainIndex[i] = coder.pick(gains.weigh(...gain, 0, 0));
-            index[i] = coder.pick(shapes.weigh(...first, ...second));
+            model.expect(Math.floor(at / width), at % width);
+            gains.weigh(predictors[0].predicted, predictors[0].s, 0, 0);
+            gainIndex[i] = coder.pick(gains.weights, gains.total, gains.start, gains.end);
+            shapes.weigh(predictors[1].predicted, predictors[1].s, predictors[2].predicted, predictors[2].s);
+            index[i] = coder.pick(shapes.weights, shapes.total, shapes.start, shapes.end);
+            if (gains.reached + shapes.reached > most) {
+                throw new Error(`entries within reach: expected at most ${most}, found more`);
+            }
             gains.learn(gainIndex[i]);
             shapes.learn(index[i]);
-            model.learn(at, [gainIndex[i], index[i], index[i]].map((entry, c) => places[c][entry]));
+            for (let c = 0; c < 3; c++) model.learn(at, c, places[c][c ? index[i] : gainIndex[i]]);
         }
     }
     coder.checkEnd();
@@ -42,14 +51,17 @@ class Decoder {
         return this.bytes[this.read++] ?? 0;
     }
 
-    pick(weights) {
-        let total = 0;
-        for (const weight of weights) total += weight;
+    /** total: of all weights. Those before `first`, and from `end` on, are 1: they are not looked at. */
+    pick(weights, total, first = 0, end = weights.length) {
         const share = Math.floor(this.range / total);
         const at = Math.floor(this.code / share);
-        bounded("code", at, 0, total - 1);
-        let [symbol, below] = [0, 0];
-        while (below + weights[symbol] <= at) below += weights[symbol++];
+        if (at >= total) throw new Error("stream: expected symbols of the range coder, found a code beyond all of them");
+        let symbol = Math.min(at, first);
+        let below = symbol;
+        if (symbol === first) {
+            while (symbol < end && below + weights[symbol] <= at) below += weights[symbol++];
+            if (symbol === end) [symbol, below] = [end + at - below, at];
+        }
         this.code -= share * below;
         this.range = share * weights[symbol];
         while (this.range < 2 ** 24) {
@@ -61,7 +73,7 @@ class Decoder {
 
     bit(context, i) {
         const one = context[i];
-        const bit = this.pick([4096 - one, one]);
+        const bit = this.pick([4096 - one, one], 4096);
         context[i] = bit ? one + ((4096 - one) >> 4) : one - (one >> 4);
         return bit;
     }
@@ -70,7 +82,7 @@ class Decoder {
         let [n, x] = [0, 1];
         while (n < 20 && this.bit(context, n)) n++;
         for (let i = n - 1; i >= 0; i--) {
-            x = 2 * x + (i === n - 1 && i < 4 ? this.bit(context, 20 + i) : this.pick([2048, 2048]));
+            x = 2 * x + (i === n - 1 && i < 4 ? this.bit(context, 20 + i) : this.pick([2048, 2048], 4096));
         }
         return x - 1;
     }
@@ -180,24 +192,27 @@ class Model {
         return plane.map((grids) => grids.map((a) => Float64Array.from(ways, blend(a))));
     }
 
-    /** For each coordinate [predicted, s]. */
+    /** Has each coordinate's predictor predict. */
     expect(d, p) {
-        const { phiD, width } = this;
+        const { phiD, width, predictors } = this;
         const m = FINE - phiD[p];
         const mirror = p > 0 && m <= phiD[p - 1] ? between(phiD, p, m) : null;
         const at = d * width + p;
-        return this.predictors.map((predictor, c) => {
-            const errors = [];
-            if (p > 0) errors.push(this.present[1][c][at - 1]);
-            if (d > 0) errors.push(this.present[1][c][at - width]);
-            if (this.row > 0) errors.push(this.above[1][c][at]);
-            return predictor.predict(...this.neighbours(c, d, p, mirror), errors);
-        });
+        for (let c = 0; c < 3; c++) {
+            const predictor = predictors[c];
+            const up = this.neighbours(c, d, p, mirror, predictor.x);
+            let [total, count] = [0.7 * predictor.level, 0.7];
+            if (p > 0) [total, count] = [total + this.present[1][c][at - 1], count + 1];
+            if (d > 0) [total, count] = [total + this.present[1][c][at - width], count + 1];
+            if (this.row > 0) [total, count] = [total + this.above[1][c][at], count + 1];
+            predictor.predict(up, total / count);
+        }
     }
 
-    neighbours(c, d, p, mirror) {
+    /** Fills in the values; returns the one that all are compared with. */
+    neighbours(c, d, p, mirror, values) {
         const { width } = this;
-        const [now, above, higher] = [this.present, this.above, this.higher].map((plane) => plane?.[0][c]);
+        const [now, above, higher] = [this.present[0][c], this.above?.[0][c], this.higher?.[0][c]];
         const [line, at, under] = [d * width, d * width + p, this.row > 0];
         const [west, east] = [line + ((p + width - 1) % width), line + ((p + 1) % width)];
         let up = p > 0 ? now[at - 1] : d > 0 ? now[at - width] : 0;
@@ -209,26 +224,22 @@ class Model {
             const before = under ? above[line + q0] * (1 - u) + above[line + q1] * u : up;
             news = now[line + q0] * (1 - u) + now[line + q1] * u - before;
         }
-        const values = [
-            p > 0 ? now[at - 1] : under ? above[west] : up,
-            d > 0 ? now[at - width] : up,
-            d > 0 ? now[west - width] : up,
-            d > 0 ? now[east - width] : up,
-            under ? above[west] : up,
-            under && d > 0 ? above[at - width] : up,
-            under ? above[east] : up,
-            under && d + 1 < this.height ? above[at + width] : up,
-            this.row > 1 ? higher[at] : up,
-            up + news,
-        ];
-        return [up, values];
+        values[0] = p > 0 ? now[at - 1] : under ? above[west] : up;
+        values[1] = d > 0 ? now[at - width] : up;
+        values[2] = d > 0 ? now[west - width] : up;
+        values[3] = d > 0 ? now[east - width] : up;
+        values[4] = under ? above[west] : up;
+        values[5] = under && d > 0 ? above[at - width] : up;
+        values[6] = under ? above[east] : up;
+        values[7] = under && d + 1 < this.height ? above[at + width] : up;
+        values[8] = this.row > 1 ? higher[at] : up;
+        values[9] = up + news;
+        return up;
     }
 
-    learn(at, values) {
-        values.forEach((value, c) => {
-            this.present[0][c][at] = value;
-            this.present[1][c][at] = this.predictors[c].learn(value);
-        });
+    learn(at, c, value) {
+        this.present[0][c][at] = value;
+        this.present[1][c][at] = this.predictors[c].learn(value);
     }
 }
 
@@ -236,30 +247,34 @@ class Predictor {
     constructor(values) {
         const mean = sum(values) / values.length;
         const variance = sum(values.map((value) => (value - mean) * (value - mean))) / values.length + 1e-4;
-        this.w = [0.5, 0.5, 0, 0, -0.5, -0.5, 0, 0, 0, 0];
-        this.matrix = this.w.map((_, i) => Float64Array.from(this.w, (_, j) => (i === j ? 25 / variance : 0)));
+        this.w = Float64Array.of(0.5, 0.5, 0, 0, -0.5, -0.5, 0, 0, 0, 0);
+        this.matrix = Float64Array.from({ length: 100 }, (_, k) => (k % 11 === 0 ? 25 / variance : 0));
         this.level = 0.15 * Math.sqrt(variance);
+        [this.x, this.g] = [new Float64Array(10), new Float64Array(10)];
     }
 
-    predict(up, values, errors) {
-        this.x = values.map((value) => value - up);
-        this.predicted = this.x.reduce((found, x, i) => found + this.w[i] * x, up);
-        const total = errors.reduce((found, error) => found + error, 0.7 * this.level);
-        const count = errors.reduce((found) => found + 1, 0.7);
-        return [this.predicted, 1 / (total / count + 0.02 * this.level + 1e-4)];
+    /** x holds the neighbours' values, from which `up` is taken. */
+    predict(up, error) {
+        const { w, x } = this;
+        this.predicted = up;
+        for (let i = 0; i < 10; i++) {
+            x[i] -= up;
+            this.predicted += w[i] * x[i];
+        }
+        this.s = 1 / (error + 0.02 * this.level + 1e-4);
     }
 
     learn(value) {
-        const { matrix, w, x } = this;
+        const { matrix, w, x, g } = this;
         const error = value - this.predicted;
-        const g = new Float64Array(10);
-        for (let i = 0; i < 10; i++) for (let j = 0; j < 10; j++) g[j] += matrix[i][j] * x[i];
+        g.fill(0);
+        for (let i = 0; i < 10; i++) for (let j = 0; j < 10; j++) g[j] += matrix[10 * i + j] * x[i];
         let power = 1;
         for (let i = 0; i < 10; i++) power += g[i] * x[i];
         const r = 1 / power;
         for (let i = 0; i < 10; i++) {
             w[i] += g[i] * r * error;
-            for (let j = 0; j < 10; j++) matrix[i][j] = (matrix[i][j] - g[i] * g[j] * r) * 1.0005;
+            for (let j = 0; j < 10; j++) matrix[10 * i + j] = (matrix[10 * i + j] - g[i] * g[j] * r) * 1.0005;
         }
         this.level = 0.98 * this.level + 0.02 * Math.abs(error);
         return Math.abs(error);
@@ -269,43 +284,61 @@ class Predictor {
 /** Entries of a palette, and how likely each is. */
 class Entries {
     constructor(first, second) {
-        [this.first, this.second, this.narrow] = [first, second, 0.5];
+        [this.first, this.second] = [Float64Array.from(first), Float64Array.from(second)];
+        this.narrow = 0.5;
         this.before = new Uint16Array(4098); // entries whose step is below
         for (const place of first) this.before[step(place) + 1]++;
         for (let i = 1; i < this.before.length; i++) this.before[i] += this.before[i - 1];
-        [this.counts, this.roots] = [first.map(() => 1), first.map(() => 1)];
-        this.weights = new Uint32Array(first.length);
-        [this.near, this.far] = [new Float64Array(first.length), new Float64Array(first.length)];
+        const size = first.length;
+        [this.counts, this.roots] = [new Float64Array(size).fill(1), new Float64Array(size).fill(1)];
+        [this.near, this.far] = [new Float64Array(size), new Float64Array(size)];
+        this.weights = new Uint32Array(size).fill(1);
+        [this.start, this.end] = [0, 0]; // of the entries within reach; all others weigh 1
+        this.reached = 0; // how many they were, added up over all nodes so far
     }
 
     weigh(p0, s0, p1, s1) {
-        this.expected = [p0, s0, p1, s1];
+        const { near, far, weights, before } = this;
+        weights.fill(1, this.start, this.end);
+        [this.p0, this.s0, this.p1, this.s1] = [p0, s0, p1, s1];
         const reach = 16 / s0;
-        const [first, end] = [this.before[step(p0 - reach)], this.before[step(p0 + reach) + 1]];
-        const { near, far, weights } = this;
-        for (let i = first; i < end; i++) [near[i], far[i]] = this.kernels(i);
-        this.f = this.narrow / sum4(near, first, end);
-        this.g = (1 - this.narrow) / sum4(far, first, end);
+        const start = (this.start = before[step(p0 - reach)]);
+        const end = (this.end = before[step(p0 + reach) + 1]);
+        this.reached += end - start;
+        this.measure(start, end);
+        this.f = this.narrow / sum4(near, start, end);
+        this.g = (1 - this.narrow) / sum4(far, start, end);
         const [f, g] = [this.f * 65536, this.g * 65536];
-        weights.fill(1);
-        for (let i = first; i < end; i++) weights[i] = 1 + ((near[i] * f + far[i] * g) >>> 0);
-        return weights;
+        let total = weights.length;
+        for (let i = start; i < end; i++) {
+            const more = (near[i] * f + far[i] * g) >>> 0;
+            weights[i] = 1 + more;
+            total += more;
+        }
+        this.total = total;
     }
 
-    kernels(i) {
-        const [p0, s0, p1, s1] = this.expected;
-        let [x, y] = [(this.first[i] - p0) * s0, (this.second[i] - p1) * s1];
-        [x, y] = [x * x, y * y];
-        let a = (1 + x * 2.25) * (1 + y * 2.25);
-        let b = (1 + x * 0.25) * (1 + y * 0.25);
-        [a, b] = [a * a, b * b];
-        const c = this.roots[i] / (a * b);
-        return [c * b, c * a];
+    /** The kernels of entries around what is expected. */
+    measure(start, end) {
+        const { first, second, roots, near, far, p0, s0, p1, s1 } = this;
+        for (let i = start; i < end; i++) {
+            let x = (first[i] - p0) * s0;
+            let y = (second[i] - p1) * s1;
+            x *= x;
+            y *= y;
+            let a = (1 + x * 2.25) * (1 + y * 2.25);
+            let b = (1 + x * 0.25) * (1 + y * 0.25);
+            a *= a;
+            b *= b;
+            const c = roots[i] / (a * b);
+            near[i] = c * b;
+            far[i] = c * a;
+        }
     }
 
     learn(i) {
-        let [near, far] = this.kernels(i);
-        [near, far] = [near * this.f, far * this.g];
+        this.measure(i, i + 1);
+        const [near, far] = [this.near[i] * this.f, this.far[i] * this.g];
         this.narrow = 0.96 * (near / (near + far)) + 0.02;
         this.roots[i] = Math.sqrt(++this.counts[i]);
     }
@@ -334,7 +367,16 @@ function sum(values) {
 }
 
 function sum4(values, first, end) {
-    const lanes = [0, 0, 0, 0];
-    for (let i = first; i < end; i++) lanes[(i - first) & 3] += values[i];
-    return lanes[0] + lanes[1] + (lanes[2] + lanes[3]) + 1e-300;
+    let [a, b, c, d] = [0, 0, 0, 0];
+    let i = first;
+    for (; i + 4 <= end; i += 4) {
+        a += values[i];
+        b += values[i + 1];
+        c += values[i + 2];
+        d += values[i + 3];
+    }
+    if (i < end) a += values[i];
+    if (i + 1 < end) b += values[i + 1];
+    if (i + 2 < end) c += values[i + 2];
+    return a + b + (c + d) + 1e-300;
 }

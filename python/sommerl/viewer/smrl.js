@@ -9,27 +9,34 @@ import { readNodes } from "./nodes.js";
 
 const ON_HORIZON = 1e-12;
 const MOST_CELLS = 2 ** 22;
+const LONGEST_FILE = 2 * MOST_CELLS + 24 * 2 ** 16 + 2 ** 20;
+const DEEPEST_NOTES = 32;
 
 export async function decode(arrayBuffer) {
     const bytes = new Uint8Array(arrayBuffer);
     const reader = new Reader(bytes);
-    expect(reader.text(4) === "SMRL", "a material file (.smrl), found another kind");
+    expect(bytes.length <= LONGEST_FILE, `at most ${LONGEST_FILE} bytes, found ${bytes.length}`);
+    expect(bytes.length >= 10, `at least 10 bytes, found ${bytes.length}`);
+    expect(String.fromCharCode(...reader.take(4)) === "SMRL", "a material file (.smrl), found another kind");
     const version = reader.number(2);
-    expect(version === 1, `version 1, found version ${version}`);
-    expect(reader.number(4) === crc32(bytes.subarray(10)), "the checksum in the file, found another");
+    const hint = version > 1 ? "a newer Sommerl may read it" : "make it from its source again";
+    expect(version === 1, `version 1, found version ${version}; ${hint}`);
+    const whole = reader.number(4) === crc32(bytes.subarray(10));
+    expect(whole, "the checksum in the file, found another: the file is damaged or cut off");
     const kind = reader.number(1);
+    expect(kind < 2, `kind 0 or 1, found ${kind}`);
     const name = reader.text(reader.number(1));
+    expect(name !== null, "a name in UTF-8, found other bytes");
     const digest = reader.number(1);
-    expect(kind < 2 && (digest === 0 || digest === 32), "kind 0 or 1 and a digest of 0 or 32 bytes, found others");
+    expect(digest === 0 || digest === 32, `a digest of 0 or 32 bytes, found ${digest}`);
     const sha256 = Array.from(reader.take(digest), (byte) => byte.toString(16).padStart(2, "0")).join("");
-    const notes = object(JSON.parse(reader.text(reader.number(2)) || "{}"));
-    const known = { name, sha256, notes: { options: object(notes.options ?? {}), metrics: object(notes.metrics ?? {}) } };
-    return { ...known, ...(kind ? nodes(reader) : await cells(reader)) };
+    const notes = readNotes(reader.text(reader.number(2)));
+    return { name, sha256, notes, ...(kind ? nodes(reader) : await cells(reader)) };
 }
 
 function nodes(reader) {
     const scale = new DataView(reader.take(4).slice().buffer).getFloat32(0, true);
-    expect(scale > 0 && scale < Infinity, `a positive scale, found ${scale}`);
+    expect(scale > 0 && scale < Infinity, "a positive scale that is finite, found another");
     const { lattice, gainCodes, shapeCodes, gainIndex, index } = readNodes(reader.rest());
     const gains = Float64Array.from(gainCodes, (code) => 0.5 * (2 ** (code >> 7) * (1 + (code & 127) / 128) - 1));
     const lut = Float64Array.from(shapeCodes.flatMap(shape));
@@ -42,11 +49,12 @@ function shape([first, second]) {
 }
 
 async function cells(reader) {
-    const [thetaH, thetaD, phiD, reciprocal, trilinear, clusters] = [2, 2, 2, 1, 1, 4].map((n) => reader.number(n));
+    const head = new Reader(reader.take(12));
+    const [thetaH, thetaD, phiD, reciprocal, trilinear, clusters] = [2, 2, 2, 1, 1, 4].map((n) => head.number(n));
     const size = thetaH * thetaD * phiD;
     expect(size > 0 && size <= MOST_CELLS, `a lattice of 1 to ${MOST_CELLS} cells, found ${size}`);
     expect(clusters > 0 && clusters <= 65536, `a LUT of 1 to 65536 entries, found ${clusters}`);
-    expect(reciprocal < 2 && trilinear < 2, "flags of 0 or 1, found others");
+    expect(reciprocal < 2 && trilinear < 2, `flags of 0 or 1, found ${reciprocal} and ${trilinear}`);
     const lattice = { thetaH, thetaD, phiD, reciprocal: reciprocal === 1 };
     const above = aboveHorizon(lattice);
     const width = clusters <= 256 ? 1 : 2;
@@ -55,11 +63,13 @@ async function cells(reader) {
     const lut = Float64Array.from({ length: 3 * clusters }, (_, i) => view.getFloat64(8 * i, true));
     expect(lut.every((x) => x >= 0 && x < Infinity), "LUT entries that are finite and not negative, found others");
     const index = width === 1 ? new Uint8Array(size) : new Uint16Array(size);
+    let largest = 0;
     above.forEach((cell, i) => {
         const at = 24 * clusters + width * i;
         index[cell] = width === 1 ? payload[at] : view.getUint16(at, true);
-        expect(index[cell] < clusters, `indices below ${clusters}, found ${index[cell]}`);
+        largest = Math.max(largest, index[cell]);
     });
+    expect(largest < clusters, `indices below ${clusters}, found ${largest}`);
     const interpolation = trilinear ? "trilinear" : "nearest";
     return { kind: "cells", interpolation, scale: 1, lattice, lut, index };
 }
@@ -87,11 +97,10 @@ function aboveHorizon({ thetaH, thetaD, phiD, reciprocal }) {
 /** Exactly `expected` bytes, and never many more than that in memory. */
 async function inflated(compressed, expected) {
     const payload = new Uint8Array(expected);
-    const found = await inflate(compressed, payload);
-    expect(found === expected, `${expected} bytes of LUT and index, found another number`);
+    const found = await inflate(compressed, payload).catch(() => null);
     // The stream ends with the file if it has no end without the last byte; not all decompressors mind what follows.
-    const longer = await inflate(compressed.subarray(0, -1), null).then(() => true, () => false);
-    expect(!longer, "the end of the file after LUT and index, found more");
+    const ends = found === expected && (await inflate(compressed.subarray(0, -1), null).catch(() => null)) === null;
+    expect(ends, `a stream of ${expected} bytes, deflated, that ends with the file, found another`);
     return payload;
 }
 
@@ -125,8 +134,14 @@ class Reader {
         return this.take(count).reduceRight((sum, byte) => 256 * sum + byte, 0);
     }
 
+    /** null if it is none. */
     text(count) {
-        return new TextDecoder("utf-8", { fatal: true, ignoreBOM: true }).decode(this.take(count));
+        const bytes = this.take(count);
+        try {
+            return new TextDecoder("utf-8", { fatal: true, ignoreBOM: true }).decode(bytes);
+        } catch {
+            return null;
+        }
     }
 
     rest() {
@@ -138,9 +153,23 @@ function expect(fine, what) {
     if (!fine) throw new Error(`expected ${what}`);
 }
 
-function object(value) {
-    expect(value !== null && typeof value === "object" && !Array.isArray(value), "notes of JSON objects, found others");
-    return value;
+/** Options and metrics. */
+function readNotes(text) {
+    const isObject = (value) => value !== null && typeof value === "object" && !Array.isArray(value);
+    const fine = (value, deepest) => {
+        if (value === null || typeof value !== "object") return typeof value !== "number" || Number.isFinite(value);
+        return deepest > 0 && Object.values(value).every((inner) => fine(inner, deepest - 1));
+    };
+    let notes = null;
+    try {
+        notes = text === null ? null : JSON.parse(text || "{}");
+    } catch {
+        // which is told below
+    }
+    const { options = {}, metrics = {} } = notes ?? {};
+    const found = isObject(notes) && fine(notes, DEEPEST_NOTES) && isObject(options) && isObject(metrics);
+    expect(found, `notes of JSON objects, ${DEEPEST_NOTES} deep at most, with finite numbers, found others`);
+    return { options, metrics };
 }
 
 const CRCS = Uint32Array.from({ length: 256 }, (_, byte) => {

@@ -27,6 +27,8 @@ pub struct Entries {
     /// What the kernels are multiplied with, so that together they hold 1.
     factors: [f64; 2],
     pub weights: Vec<u32>,
+    /// Entries within reach, added up over all nodes so far.
+    pub reached: usize,
     heights: [Vec<f64>; 2],
 }
 
@@ -48,6 +50,7 @@ impl Entries {
             narrow: 0.5,
             factors: [1.0; 2],
             weights: vec![1; n],
+            reached: 0,
             heights: [vec![0.0; n], vec![0.0; n]],
         }
     }
@@ -59,6 +62,7 @@ impl Entries {
         let range = self.before[step(p0 - reach)].into()..self.before[step(p0 + reach) + 1].into();
         let [first, second] = self.places.each_ref().map(|places| &places[range.clone()]);
         let roots = &self.roots[range.clone()];
+        self.reached += roots.len();
         let [narrow, wide] = self.heights.each_mut().map(|heights| &mut heights[..roots.len()]);
         let (first, second) = (&first[..roots.len()], &second[..roots.len()]);
         for i in 0..roots.len() {

@@ -144,6 +144,12 @@ impl<'a> Model<'a> {
         &self.shapes.weights
     }
 
+    /// Entries of both palettes within reach, added up over all nodes so far.
+    #[inline(always)]
+    pub fn reached(&self) -> usize {
+        self.gains.reached + self.shapes.reached
+    }
+
     /// A gain has one coordinate; the other never differs.
     #[inline(always)]
     fn gain_expected(&self) -> Expected {

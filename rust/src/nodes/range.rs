@@ -18,6 +18,11 @@ pub trait Coder {
     /// One of several symbols, by weights that are all above 0 and add up to less than 2^24.
     fn pick(&mut self, symbol: usize, weights: &[u32]) -> usize;
 
+    /// Whether something was found that no encoder writes. All that came after it means nothing.
+    fn lost(&self) -> bool {
+        false
+    }
+
     /// A bit whose chance to be one learns from it.
     fn bit(&mut self, bit: bool, one: &mut u32) -> bool {
         let bit = self.pick(bit.into(), &[2 * EVEN - *one, *one]) == 1;
@@ -139,7 +144,7 @@ impl<'a> Decoder<'a> {
     pub fn is_the_encoders(&self) -> bool {
         let low = self.window.wrapping_sub(self.code);
         let ends = self.read >= self.data.len() && self.data.last() != Some(&0);
-        ends && !self.lost && roundest(low.into(), self.range) as u32 == self.window
+        ends && roundest(low.into(), self.range) as u32 == self.window
     }
 }
 
@@ -162,6 +167,11 @@ impl Coder for Decoder<'_> {
             self.shift();
         }
         symbol
+    }
+
+    #[inline(always)]
+    fn lost(&self) -> bool {
+        self.lost
     }
 }
 
