@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from argparse import Namespace
+from collections.abc import Callable
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -170,7 +171,8 @@ def compare(options: Namespace) -> dict[str, Any]:
         check_output(options.output, (".png",), options.reference, options.candidate, options.envmap)
     reference, candidate = alike(load(options.reference), load(options.candidate), options.lookup)
     check_rendering(options)
-    environment = environment_of(options)
+    warnings = console.Warnings()
+    environment = environment_of(options, warnings)
     with console.progress("rendering") as advance:
         comparison = compare_on_sphere(
             reference,
@@ -185,7 +187,7 @@ def compare(options: Namespace) -> dict[str, Any]:
         write_image(options.output, side_by_side(comparison.pictures()))
     metrics = table_distance(reference, candidate)
     result = asdict(comparison.metrics) | {f"table_{name}": value for name, value in metrics.items()}
-    result |= {"reference": label(reference), "candidate": label(candidate)}
+    result |= {"reference": label(reference), "candidate": label(candidate), "warnings": warnings.told}
     if options.output:
         result["image"] = str(options.output)
     if not options.json:
@@ -321,6 +323,6 @@ def check_rendering(options: Namespace) -> None:
         raise FormatError(f"{options.envmap}: expected an environment image, found no file")
 
 
-def environment_of(options: Namespace) -> Any:
+def environment_of(options: Namespace, warn: Callable[[str], None]) -> Any:
     """The environment asked for, or the built-in one."""
-    return load_environment(options.envmap) if options.envmap else default_environment()
+    return load_environment(options.envmap, warn) if options.envmap else default_environment()

@@ -9,6 +9,17 @@ from contextlib import contextmanager
 Advance = Callable[[int, int], None]
 
 
+class Warnings:
+    """Says on standard error what is not as expected, and keeps it: `told`."""
+
+    def __init__(self) -> None:
+        self.told: list[str] = []
+
+    def __call__(self, sentence: str) -> None:
+        self.told.append(sentence)
+        print(f"warning: {sentence}", file=sys.stderr)
+
+
 @contextmanager
 def progress(what: str) -> Generator[Advance | None]:
     """A progress bar on standard error, if that is a terminal: a function of steps done and steps in all."""

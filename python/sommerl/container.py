@@ -49,14 +49,10 @@ def opened(data: bytes, magic: bytes, version: int, kind: str) -> Reader:
     return Reader(data, PREFIX.size)
 
 
-def load(path: str | Path, longest: int, decode: Callable[[bytes], Material]) -> Material:
-    """What `decode` makes of a file of at most `longest` bytes; its errors name the file."""
-    path = Path(path)
-    length = path.stat().st_size
-    if length > longest:
-        raise FormatError(f"{path}: expected at most {longest} bytes, found {length}")
+def named(path: Path, data: bytes, decode: Callable[[bytes], Material]) -> Material:
+    """What `decode` makes of a file's bytes; its errors name the file."""
     try:
-        material = decode(path.read_bytes())
+        material = decode(data)
     except SommerlError as error:
         raise FormatError(f"{path}: {error}") from error
     material.name = visible(material.name)

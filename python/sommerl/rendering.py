@@ -97,12 +97,7 @@ class Setting:
 
 
 def render(options: Namespace) -> dict[str, Any]:
-    warnings: list[str] = []
-
-    def warn(sentence: str) -> None:
-        warnings.append(sentence)
-        print(f"warning: {sentence}", file=sys.stderr)
-
+    warn = console.Warnings()
     check_rendering(options)
     pairs = _pairs(options)
     outputs = _outputs(options, pairs)
@@ -145,7 +140,7 @@ def render(options: Namespace) -> dict[str, Any]:
         print(f"{shown} → {options.output} ({seconds:.1f} s)")
         if rows:
             console.print_rows(f"{result['candidate']} against {result['reference']}", rows)
-    return result | {"warnings": warnings}
+    return result | {"warnings": warn.told}
 
 
 def _outputs(options: Namespace, pairs: Sequence[Pair]) -> dict[str, Path]:
@@ -237,7 +232,7 @@ def _setting(options: Namespace, warn: Callable[[str], None]) -> Setting:
     mesh = load_mesh(options.mesh) if options.mesh else None
     if mesh and mesh.found:
         warn(mesh.found)
-    return Setting(environment_of(options) if taken.environment else None, mesh)
+    return Setting(environment_of(options, warn) if taken.environment else None, mesh)
 
 
 def _rendered(

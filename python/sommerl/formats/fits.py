@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
+from .. import door
 from ..errors import FormatError, MaterialError
 from ..files import atomic_write, visible
 from ..models.multi_lobe import FAMILIES, Lobe, MultiLobe
@@ -35,11 +36,13 @@ def write(path: Path, material: str, fits: Sequence[Mapping[str, Any]]) -> None:
 
 def read(path: str | Path, member: str = "") -> MultiLobe:
     """One of the fits in a file. member: its model; the first if empty. Raises FormatError."""
-    path = Path(path)
-    if path.stat().st_size > LARGEST_FILE:
-        raise FormatError(f"{path}: expected at most {LARGEST_FILE} bytes, found {path.stat().st_size}")
+    return parse(Path(path), door.read(path, LARGEST_FILE), member)
+
+
+def parse(path: Path, data: bytes, member: str = "") -> MultiLobe:
+    """The same of a file's bytes."""
     try:
-        found = json.loads(path.read_bytes())
+        found = json.loads(data)
     except (ValueError, RecursionError) as error:
         raise FormatError(f"{path}: expected JSON, found something else ({error})") from error
     top = _mapping(path, "the file", found)

@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 import difflib
-import math
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,41 +17,44 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import door
 from ..errors import FormatError, MaterialError
 from ..models.nbrdf import SHAPES, WEIGHTS, NeuralBrdf
-from ..optional import optional
+from . import hdf5
 from .arrays_on_disk import MAGIC, read_npy, read_npz
 from .names import printable
 
-HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 ARRAYS = ("fc1", "b1", "fc2", "b2", "fc3", "b3")
-LARGEST_FILE = 2**24
-LARGEST_CHUNK = 2**16  # numbers
+LARGEST_FILE = 2**24  # bytes
 
 
 def read(path: str | Path, member: str = "") -> NeuralBrdf:
     """The material in a file. member: which of the materials in an .npz file. Raises FormatError."""
-    path = Path(path)
-    with path.open("rb") as stream:
-        head = stream.read(len(HDF5_MAGIC))
+    return parse(Path(path), door.read(path, LARGEST_FILE), member)
+
+
+def parse(path: Path, data: bytes, member: str = "") -> NeuralBrdf:
+    """The same of a file's bytes; of NAME_fc1.npy, the other arrays are read beside it."""
     try:
-        if head.startswith(HDF5_MAGIC):
-            return _layers(_keras(path), printable(path.stem))
-        if head.startswith(MAGIC):
-            return _npy(path)
-        return _npz(path, read_npz(path), member)
+        if hdf5.looks_like(data):
+            return _layers(_keras(path, data), printable(path.stem))
+        if data.startswith(MAGIC):
+            return _npy(path, data)
+        return _npz(path, read_npz(path, data), member)
     except MaterialError as error:
         raise FormatError(f"{path}: {error}") from error
 
 
-def _npy(path: Path) -> NeuralBrdf:
+def _npy(path: Path, data: bytes) -> NeuralBrdf:
     name, mark, part = path.stem.rpartition("_")
     if not mark or part not in ARRAYS:
-        return NeuralBrdf.from_flat(_numbers(read_npy(path)).reshape(-1), name=printable(path.stem))
-    missing = [other for other in ARRAYS if not (path.parent / f"{name}_{other}.npy").is_file()]
+        return NeuralBrdf.from_flat(_numbers(read_npy(path, data)).reshape(-1), name=printable(path.stem))
+    beside = {other: path.with_name(f"{name}_{other}.npy") for other in ARRAYS if other != part}
+    missing = [file.name for file in beside.values() if not os.path.isfile(file)]
     if missing:
-        raise FormatError(f"{path}: expected {name}_{missing[0]}.npy beside it, found none")
-    return _layers({other: read_npy(path.parent / f"{name}_{other}.npy") for other in ARRAYS}, printable(name))
+        raise FormatError(f"{path}: expected {missing[0]} beside it, found none")
+    found = {other: read_npy(file, door.read(file, LARGEST_FILE)) for other, file in beside.items()}
+    return _layers(found | {part: read_npy(path, data)}, printable(name))
 
 
 def _npz(path: Path, arrays: Mapping[str, NDArray[Any]], member: str) -> NeuralBrdf:
@@ -81,31 +84,12 @@ def _numbers(array: NDArray[Any]) -> NDArray[np.float64]:
     return array.astype(np.float64)
 
 
-def _keras(path: Path) -> dict[str, NDArray[Any]]:
+def _keras(path: Path, data: bytes) -> dict[str, NDArray[Any]]:
     """The arrays of the dense layers in a Keras model, in their order."""
-    h5py = optional("h5py", "h5py", str(path), "formats")
-    if path.stat().st_size > LARGEST_FILE:
-        raise FormatError(f"{path}: expected at most {LARGEST_FILE} bytes, found {path.stat().st_size}")
     layers: dict[str, dict[str, NDArray[Any]]] = {}
-
-    def visit(name: str, item: Any) -> None:
-        layer, _, part = name.rpartition("/")
-        part = part.split(":")[0]
-        if isinstance(item, h5py.Dataset) and part in ("kernel", "bias"):
-            if item.size > WEIGHTS or item.dtype.kind != "f":
-                raise FormatError(f"{path}: {name}: expected at most {WEIGHTS} weights, found {item.shape}")
-            if math.prod(item.chunks or ()) > LARGEST_CHUNK or item.is_virtual or item.external:
-                raise FormatError(f"{path}: {name}: expected weights stored in the file, found large chunks or links")
-            layers.setdefault(layer, {})[part] = np.asarray(item)
-
-    try:
-        with h5py.File(path, "r") as file:
-            top = file.get("model_weights", file)
-            if not isinstance(top, h5py.Group):
-                raise FormatError(f"{path}: model_weights: expected a group of layers, found one array")
-            top.visititems(visit)
-    except (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise FormatError(f"{path}: expected an HDF5 file, found a damaged one ({error})") from error
+    for place, array in hdf5.arrays(path, data, "model_weights", ("kernel", "bias"), WEIGHTS).items():
+        layer, _, part = place.rpartition("/")
+        layers.setdefault(layer, {})[part.split(":")[0]] = array
     found = {layer["kernel"].shape: layer for layer in layers.values() if len(layer) == 2}
     if len(layers) != len(SHAPES) or set(found) != set(SHAPES):
         raise FormatError(f"{path}: expected dense layers of shapes {SHAPES} with biases, found {list(found)}")

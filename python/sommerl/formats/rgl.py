@@ -9,12 +9,14 @@ vectors, and the reflectance times cosine, relative to that density, on a grid o
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import door
 from ..arrays import Array, Triple, ops
 from ..brdf import Brdf, Buffers
 from ..errors import FormatError
@@ -22,7 +24,7 @@ from ..half_diff import TWO_PI, directions
 from ..lattice import MERL
 from ..metrics import asymmetry
 from . import tensor
-from .names import printable, sha256_of
+from .names import printable
 from .spectra import srgb_weights
 
 LARGEST_SIDE = 4096  # of any grid in a file
@@ -175,8 +177,12 @@ def read(path: str | Path, *, reciprocal: bool = True) -> RglBrdf:
 
     A spectral file is converted to linear sRGB. reciprocal: see `RglBrdf`.
     """
-    path = Path(path)
-    file = tensor.TensorFile(path)
+    return parse(Path(path), door.read(path, tensor.LARGEST_FILE), reciprocal=reciprocal)
+
+
+def parse(path: Path, data: bytes, *, reciprocal: bool = True) -> RglBrdf:
+    """The same of a file's bytes."""
+    file = tensor.TensorFile(path, data)
     colours = "rgb" if "rgb" in file.fields else "spectra"
     _check(file, colours)
     theta_i, phi_i = file.array("theta_i"), file.array("phi_i")
@@ -203,7 +209,7 @@ def read(path: str | Path, *, reciprocal: bool = True) -> RglBrdf:
         jacobian=bool(file.array("jacobian")[0]),
         reciprocal=reciprocal,
         name=printable(path.stem),
-        source_sha256=sha256_of(path),
+        source_sha256=hashlib.sha256(data).hexdigest(),
     )
 
 

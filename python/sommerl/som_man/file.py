@@ -25,7 +25,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core, container
+from .. import _core, container, door
 from ..container import BYTE, Reader
 from ..errors import FormatError, SommerlError
 from ..files import atomic_write
@@ -61,7 +61,12 @@ def save(material: SomManBrdf, path: str | Path) -> int:
 
 def load(path: str | Path) -> SomManBrdf:
     """The material in a file. Raises FormatError if it is not one, or is damaged, or is of another version."""
-    return container.load(path, LONGEST_FILE, decode)
+    return parse(Path(path), door.read(path, LONGEST_FILE))
+
+
+def parse(path: Path, data: bytes) -> SomManBrdf:
+    """The same of a file's bytes."""
+    return container.named(path, data, decode)
 
 
 def encode(material: SomManBrdf) -> bytes:
