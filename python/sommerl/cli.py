@@ -13,7 +13,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, NoReturn, get_args
 
-from . import __version__, commands, convert, demo, plots, rendering
+from . import __version__, commands, console, convert, demo, plots, rendering
 from .errors import OptionError, SommerlError
 from .factored.fit import FactorOptions
 from .fitting.options import MOST_LOBES, FitOptions, Loss, Sampling
@@ -26,6 +26,7 @@ from .render.scenes import STAGES
 from .sampling.named import OURS, SAMPLERS
 from .som_man.budget import DEFAULT_PSNR, LARGEST_SIZE, SMALLEST_SIZE
 from .som_man.options import Order, Rule, Topology, TrainOptions
+from .visible import visible
 
 TRAIN_DEFAULTS, FIT_DEFAULTS, FACTOR_DEFAULTS = TrainOptions(), FitOptions(), FactorOptions()
 
@@ -55,7 +56,7 @@ class Parser(argparse.ArgumentParser):
     """Says what is wrong in one line."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(2, f"error: {message} (see {self.prog} --help)\n")
+        self.exit(2, f"error: {visible(message)} (see {self.prog} --help)\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -84,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _fail(message: str, status: int) -> int:
-    print(f"error: {message}", file=sys.stderr)
+    console.say(f"error: {message}", to=sys.stderr)
     return status
 
 

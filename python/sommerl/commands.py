@@ -70,7 +70,7 @@ def compress(options: Namespace) -> dict[str, Any]:
             if len(options.inputs) == 1:
                 raise
             failed += 1
-            print(f"error: {error}", file=sys.stderr)
+            console.say(f"error: {error}", to=sys.stderr)
     if failed:
         raise MaterialError(f"inputs: expected to compress {len(options.inputs)} materials, found {failed} that failed")
     return results[0] if len(results) == 1 else {"materials": results}
@@ -259,7 +259,7 @@ def plot(options: Namespace) -> dict[str, Any]:
     figure, kinds = plots.sheet(materials, options.kind)
     plots.save(figure, options.output)
     if not options.json:
-        print(f"{', '.join(materials)} → {options.output} ({', '.join(kinds)})")
+        console.say(f"{', '.join(materials)} → {options.output} ({', '.join(kinds)})")
     return {"image": str(options.output), "kinds": kinds, "materials": list(materials)}
 
 

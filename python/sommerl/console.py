@@ -5,8 +5,17 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
+from typing import TextIO
+
+from .visible import visible
 
 Advance = Callable[[int, int], None]
+
+
+def say(*lines: str, to: TextIO | None = None) -> None:
+    """Lines on standard output, or on another stream, as they can be shown: see `visible`."""
+    for line in lines:
+        print(visible(line), file=to or sys.stdout)
 
 
 class Warnings:
@@ -17,7 +26,7 @@ class Warnings:
 
     def __call__(self, sentence: str) -> None:
         self.told.append(sentence)
-        print(f"warning: {sentence}", file=sys.stderr)
+        say(f"warning: {sentence}", to=sys.stderr)
 
 
 @contextmanager
@@ -31,7 +40,7 @@ def progress(what: str) -> Generator[Advance | None]:
 
     columns = TextColumn("{task.description}", markup=False), BarColumn(), TextColumn("{task.percentage:>3.0f} %")
     with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=None)
+        task = bar.add_task(visible(what), total=None)
 
         def advance(done: int, total: int) -> None:
             bar.update(task, completed=done, total=total)
@@ -45,11 +54,11 @@ def print_rows(title: str, rows: Mapping[str, str]) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(title=Text(title), show_header=False, title_justify="left")
+    table = Table(title=Text(visible(title)), show_header=False, title_justify="left")
     table.add_column()
     table.add_column(justify="right", overflow="fold")
     for name, value in rows.items():
-        table.add_row(Text(name), Text(value))
+        table.add_row(Text(visible(name)), Text(visible(value)))
     Console().print(table)
 
 
@@ -59,11 +68,11 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(title=Text(title), title_justify="left")
+    table = Table(title=Text(visible(title)), title_justify="left")
     for number, name in enumerate(columns):
         table.add_column(Text(name), justify="right" if number else "left", overflow="fold")
     for row in rows:
-        table.add_row(*map(Text, row))
+        table.add_row(*(Text(visible(cell)) for cell in row))
     Console().print(table)
 
 

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 from .brdf import Brdf
 from .errors import FormatError, SommerlError
-from .files import visible
+from .visible import visible
 
 PREFIX = struct.Struct("<4sHI")
 BYTE = struct.Struct("<B")

@@ -48,7 +48,7 @@ def convert(options: Namespace) -> dict[str, Any]:
         result = {"output": str(output), "bytes_disk": size, "cells_clamped": getattr(written, "cells_clamped", None)}
         if not options.json:
             clamped = f", {result['cells_clamped']} cells clamped to 0" if result["cells_clamped"] else ""
-            print(f"{written.name} → {output} ({console.size(size)}{clamped})")
+            console.say(f"{written.name} → {output} ({console.size(size)}{clamped})")
     if not options.json:
         _print_report(report | {"facts": {}} if "epochs" in result else report)
     return result | report
@@ -104,8 +104,8 @@ def _report(brdf: Brdf, output: Path) -> dict[str, Any]:
 
 def _print_report(report: dict[str, Any]) -> None:
     for name, value in fact_rows(report.get("facts", {})).items():
-        print(f"  {name}: {value}")
+        console.say(f"  {name}: {value}")
     if report.get("coverage", 1) < MOSTLY:
-        print("  warning: most of this material is extrapolated")
+        console.say("  warning: most of this material is extrapolated")
     if "coverage_image" in report:
-        print(f"  where samples were missing: {report['coverage_image']}")
+        console.say(f"  where samples were missing: {report['coverage_image']}")

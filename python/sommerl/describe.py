@@ -168,4 +168,4 @@ def print_fits(title: str, rows: Sequence[Mapping[str, Any]], fits: Sequence[Fit
         table.append([fit.model, *numbers])
     console.print_table(title, columns, table)
     for fit in fits:
-        print("\n  ".join([fit.model, *map(str, fit.brdf.lobes)]))
+        console.say(fit.model, *(f"  {lobe}" for lobe in fit.brdf.lobes))

@@ -1,4 +1,4 @@
-"""Writing files so that none is ever half-written; and what is shown of names in them."""
+"""Writing files so that none is ever half-written."""
 
 from __future__ import annotations
 
@@ -41,11 +41,6 @@ def check_writable(path: Path) -> None:
         raise FileNotFoundError(errno.ENOENT, f"cannot be written: there is no folder {path.parent}", str(path))
     with _named(path), tempfile.TemporaryFile(dir=path.parent):
         pass
-
-
-def visible(name: str) -> str:
-    """A name without the characters that cannot be printed: terminals obey some of them."""
-    return "".join(c if c.isprintable() else "�" for c in name)
 
 
 @contextmanager

@@ -137,7 +137,7 @@ def render(options: Namespace) -> dict[str, Any]:
     checkpoint.remove()
     if not options.json:
         shown = ", ".join(result["materials"][:3]) + (f" and {len(labels) - 3} more" if labels[3:] else "")
-        print(f"{shown} → {options.output} ({seconds:.1f} s)")
+        console.say(f"{shown} → {options.output} ({seconds:.1f} s)")
         if rows:
             console.print_rows(f"{result['candidate']} against {result['reference']}", rows)
     return result | {"warnings": warn.told}
@@ -265,7 +265,7 @@ def _rendered(
             images = render_all(makers, spp=options.spp, seed=options.seed, progress=advance, checkpoint=checkpoint)
     except KeyboardInterrupt:
         if checkpoint.holds:
-            print(f"{checkpoint.path}: from here, the same command goes on", file=sys.stderr)
+            console.say(f"{checkpoint.path}: from here, the same command goes on", to=sys.stderr)
         raise
     rest = iter(images)
     references: list[Image] = []

@@ -15,7 +15,7 @@ import numpy as np
 from .. import door
 from ..errors import FormatError
 from ..table import BrdfTable
-from .names import printable
+from ..visible import visible
 from .scattered import Samples, to_table
 from .spectra import srgb_weights
 from .text import LARGEST_FILE, rows, text_of, uncommented
@@ -55,7 +55,7 @@ def parse(path: Path, data: bytes) -> BrdfTable:
     try:
         return to_table(
             Samples.at_angles(samples[:, :4], samples[:, 4:] @ srgb_weights(nanometres)),
-            name=printable(path.stem),
+            name=visible(path.stem),
             source_sha256=hashlib.sha256(data).hexdigest(),
         )
     except FormatError as error:

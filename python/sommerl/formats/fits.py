@@ -12,8 +12,9 @@ from typing import Any, cast
 
 from .. import door
 from ..errors import FormatError, MaterialError
-from ..files import atomic_write, visible
+from ..files import atomic_write
 from ..models.multi_lobe import FAMILIES, Lobe, MultiLobe
+from ..visible import visible
 
 KEY, VERSION = "sommerl_fits", 1
 LARGEST_FILE = 2**24  # bytes
@@ -55,7 +56,7 @@ def parse(path: Path, data: bytes, member: str = "") -> MultiLobe:
     if not fits:
         raise FormatError(f"{path}: fits: expected one or more, found none")
     if member and member not in models:
-        raise FormatError(f"{path}: expected one of {', '.join(models[:20])}, found {visible(member)}")
+        raise FormatError(f"{path}: expected one of {', '.join(models[:20])}, found {member}")
     at = models.index(member) if member else 0
     try:
         lobes = [_lobe(path, lobe) for lobe in _sequence(path, "parameters", fits[at].get("parameters"))]

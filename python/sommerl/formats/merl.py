@@ -18,7 +18,7 @@ from ..errors import FormatError, MaterialError
 from ..files import atomic_write
 from ..lattice import Lattice
 from ..table import BrdfTable
-from .names import printable
+from ..visible import visible
 
 LATTICES: dict[tuple[int, ...], Lattice] = {
     (90, 90, 180): Lattice(),
@@ -63,7 +63,7 @@ def parse(path: Path, data: bytes) -> MerlTable:
     digest = hashlib.sha256(data).hexdigest()
     planes = np.frombuffer(data, "<f8", offset=HEADER_BYTES).reshape(3, *lattice.shape)
     try:
-        table = MerlTable(_scaled(planes), lattice, name=printable(path.stem), source_sha256=digest)
+        table = MerlTable(_scaled(planes), lattice, name=visible(path.stem), source_sha256=digest)
     except MaterialError as error:
         raise MaterialError(f"{path}: {error}") from error
     table.planes = planes

@@ -1,14 +1,9 @@
-"""Names of materials, from names of files."""
+"""Names of files, and of what is in them."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
-
-
-def printable(name: str) -> str:
-    """A file's name without the bytes that are not text."""
-    return os.fsencode(name).decode("utf-8", "replace")
 
 
 def split_member(source: str | Path) -> tuple[Path, str]:

@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 from .. import door
 from ..errors import FormatError, MaterialError
 from ..models.nbrdf import SHAPES, WEIGHTS, NeuralBrdf
+from ..visible import visible
 from . import hdf5
 from .arrays_on_disk import MAGIC, read_npy, read_npz
-from .names import printable
 
 ARRAYS = ("fc1", "b1", "fc2", "b2", "fc3", "b3")
 LARGEST_FILE = 2**24  # bytes
+LONGEST_NAME = 200
 
 
 def read(path: str | Path, member: str = "") -> NeuralBrdf:
@@ -37,7 +38,7 @@ def parse(path: Path, data: bytes, member: str = "") -> NeuralBrdf:
     """The same of a file's bytes; of NAME_fc1.npy, the other arrays are read beside it."""
     try:
         if hdf5.looks_like(data):
-            return _layers(_keras(path, data), printable(path.stem))
+            return _layers(_keras(path, data), visible(path.stem))
         if data.startswith(MAGIC):
             return _npy(path, data)
         return _npz(path, read_npz(path, data), member)
@@ -48,18 +49,18 @@ def parse(path: Path, data: bytes, member: str = "") -> NeuralBrdf:
 def _npy(path: Path, data: bytes) -> NeuralBrdf:
     name, mark, part = path.stem.rpartition("_")
     if not mark or part not in ARRAYS:
-        return NeuralBrdf.from_flat(_numbers(read_npy(path, data)).reshape(-1), name=printable(path.stem))
+        return NeuralBrdf.from_flat(_numbers(read_npy(path, data)).reshape(-1), name=visible(path.stem))
     beside = {other: path.with_name(f"{name}_{other}.npy") for other in ARRAYS if other != part}
     missing = [file.name for file in beside.values() if not os.path.isfile(file)]
     if missing:
         raise FormatError(f"{path}: expected {missing[0]} beside it, found none")
     found = {other: read_npy(file, door.read(file, LARGEST_FILE)) for other, file in beside.items()}
-    return _layers(found | {part: read_npy(path, data)}, printable(name))
+    return _layers(found | {part: read_npy(path, data)}, visible(name))
 
 
 def _npz(path: Path, arrays: Mapping[str, NDArray[Any]], member: str) -> NeuralBrdf:
     if set(ARRAYS) <= arrays.keys():
-        return _layers(arrays, printable(path.stem))
+        return _layers(arrays, visible(path.stem))
     names = [name for name, array in arrays.items() if array.size == WEIGHTS]
     if not names:
         raise FormatError(f"{path}: expected arrays {', '.join(ARRAYS)}, or of {WEIGHTS} weights each, found none")
@@ -69,7 +70,7 @@ def _npz(path: Path, arrays: Mapping[str, NDArray[Any]], member: str) -> NeuralB
         nearest = difflib.get_close_matches(member, names, 1, 0.0)[0]
         raise FormatError(f"{path}: expected a material in it, found {member}; did you mean {nearest}?")
     chosen = member or names[0]
-    return NeuralBrdf.from_flat(_numbers(arrays[chosen]).reshape(-1), name=f"{chosen} (NBRDF)")
+    return NeuralBrdf.from_flat(_numbers(arrays[chosen]).reshape(-1), name=f"{visible(chosen, LONGEST_NAME)} (NBRDF)")
 
 
 def _layers(arrays: Mapping[str, NDArray[Any]], name: str) -> NeuralBrdf:

@@ -23,8 +23,8 @@ from ..errors import FormatError
 from ..half_diff import TWO_PI, directions
 from ..lattice import MERL
 from ..metrics import asymmetry
+from ..visible import visible
 from . import tensor
-from .names import printable
 from .spectra import srgb_weights
 
 LARGEST_SIDE = 4096  # of any grid in a file
@@ -208,7 +208,7 @@ def parse(path: Path, data: bytes, *, reciprocal: bool = True) -> RglBrdf:
         sigma,
         jacobian=bool(file.array("jacobian")[0]),
         reciprocal=reciprocal,
-        name=printable(path.stem),
+        name=visible(path.stem),
         source_sha256=hashlib.sha256(data).hexdigest(),
     )
 

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from .. import door
 from ..errors import FormatError
 from ..table import BrdfTable
+from ..visible import visible
 from . import arrays_on_disk
-from .names import printable
 from .scattered import Samples, to_table
 from .text import LARGEST_FILE, rows, text_of, uncommented
 
@@ -56,7 +56,7 @@ def parse(path: Path, data: bytes) -> BrdfTable:
         columns = _text(path, data)
     try:
         samples = _samples(columns)
-        return to_table(samples, name=printable(path.stem), source_sha256=hashlib.sha256(data).hexdigest())
+        return to_table(samples, name=visible(path.stem), source_sha256=hashlib.sha256(data).hexdigest())
     except FormatError as error:
         raise FormatError(f"{path}: {error}") from error
 

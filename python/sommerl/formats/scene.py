@@ -9,6 +9,7 @@ from xml.sax.saxutils import quoteattr
 
 from ..errors import FormatError
 from ..files import atomic_write
+from ..visible import visible
 from .names import split_member
 
 HEAD = """\
@@ -32,6 +33,10 @@ def write(material: str | Path, path: str | Path) -> None:
     if file.is_file():
         place = file.resolve() if path.suffix.lower() == ".json" else Path(os.path.relpath(file, path.parent))
         name = place.as_posix() + (f":{member}" if member else "")
+    if path.suffix.lower() != ".json" and (visible(name), visible(path.name)) != (name, path.name):
+        raise FormatError(
+            f"{path}: expected names of characters that can be printed, which XML takes, found {name}; .json takes it"
+        )
     if "$" in name and path.suffix.lower() != ".json":
         raise FormatError(
             f"{path}: expected a material without $ in its name, which Mitsuba's XML takes for a "

@@ -20,7 +20,7 @@ import json
 import struct
 import zlib
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ from ..errors import FormatError, SommerlError
 from ..files import atomic_write
 from ..lattice import INTERPOLATIONS, Lattice
 from ..nodes import NodeLattice
+from . import notes
 from .codes import coordinates, gain_codes, gain_values, shape_codes, shape_values
 from .material import SomManBrdf
 
@@ -52,7 +53,8 @@ def looks_like(head: bytes) -> bool:
 
 
 def save(material: SomManBrdf, path: str | Path) -> int:
-    """Writes a material file; returns its length [bytes]."""
+    """Writes a material file; returns its length [bytes]. Raises FormatError for what `load` would refuse."""
+    notes.check(material.options, material.metrics)
     data = encode(material)
     with atomic_write(Path(path)) as out:
         out.write(data)
@@ -72,9 +74,9 @@ def parse(path: Path, data: bytes) -> SomManBrdf:
 def encode(material: SomManBrdf) -> bytes:
     """The bytes of a material file. The same material always gives the same bytes."""
     known = {key: value for key, value in (("metrics", material.metrics), ("options", material.options)) if value}
-    notes = _json(known) if known else b""
+    noted = _json(known) if known else b""
     nodes = isinstance(material.lattice, NodeLattice)
-    body = _head(NODES if nodes else CELLS, material.name, material.source_sha256, notes)
+    body = _head(NODES if nodes else CELLS, material.name, material.source_sha256, noted)
     body += _nodes(material) if nodes else _cells(material)
     return container.sealed(MAGIC, VERSION, body)
 
@@ -84,15 +86,15 @@ def head_bytes(name: str, source_sha256: str) -> int:
     return container.PREFIX.size + len(_head(NODES, name, source_sha256, b"")) + NODES_HEAD.size
 
 
-def _head(kind: int, name: str, source_sha256: str, notes: bytes) -> bytes:
-    if len(notes) > LONGEST_NOTES:
-        raise FormatError(f"{name}: expected notes of at most {LONGEST_NOTES} bytes, found {len(notes)}")
-    return BYTE.pack(kind) + container.origin(name, source_sha256) + SHORT.pack(len(notes)) + notes
+def _head(kind: int, name: str, source_sha256: str, noted: bytes) -> bytes:
+    if len(noted) > LONGEST_NOTES:
+        raise FormatError(f"{name}: expected notes of at most {LONGEST_NOTES} bytes, found {len(noted)}")
+    return BYTE.pack(kind) + container.origin(name, source_sha256) + SHORT.pack(len(noted)) + noted
 
 
-def _json(notes: dict[str, Any]) -> bytes:
+def _json(noted: dict[str, Any]) -> bytes:
     try:
-        return json.dumps(notes, sort_keys=True, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
+        return json.dumps(noted, sort_keys=True, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
     except ValueError as error:
         raise FormatError(f"expected notes that JSON can hold, found others ({error})") from error
 
@@ -104,7 +106,7 @@ def decode(data: bytes) -> SomManBrdf:
         return _material(reader)
     except FormatError:
         raise
-    except (KeyError, TypeError, ValueError, RecursionError, zlib.error, SommerlError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError, zlib.error, SommerlError) as error:
         raise FormatError(f"expected a material file's header and contents, found others ({error})") from error
 
 
@@ -113,19 +115,8 @@ def _material(reader: Reader) -> SomManBrdf:
     if kind not in (CELLS, NODES):
         raise FormatError(f"expected kind 0 or 1, found {kind}")
     known: dict[str, Any] = reader.origin()
-    notes = _object(json.loads(reader.take(*reader.unpack(SHORT)).decode() or "{}", parse_constant=_finite))
-    known |= {key: _object(notes.get(key, {})) for key in ("options", "metrics")}
+    known |= notes.parsed(reader.take(*reader.unpack(SHORT)))
     return _from_nodes(reader, known) if kind == NODES else _from_cells(reader, known)
-
-
-def _finite(constant: str) -> None:
-    raise FormatError(f"expected notes that are JSON, whose numbers are finite, found {constant}")
-
-
-def _object(value: Any) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise FormatError(f"expected notes of JSON objects, found {type(value).__name__}")
-    return cast("dict[str, Any]", value)
 
 
 def _cells(material: SomManBrdf) -> bytes:

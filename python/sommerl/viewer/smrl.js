@@ -23,7 +23,7 @@ export async function decode(arrayBuffer) {
     expect(kind < 2 && (digest === 0 || digest === 32), "kind 0 or 1 and a digest of 0 or 32 bytes, found others");
     const sha256 = Array.from(reader.take(digest), (byte) => byte.toString(16).padStart(2, "0")).join("");
     const notes = object(JSON.parse(reader.text(reader.number(2)) || "{}"));
-    const known = { name, sha256, notes: { options: object(notes.options ?? {}), metrics: object(notes.metrics ?? {}) } };
+    const known = { name, sha256, notes: { options: plain(notes.options, "source_facts"), metrics: plain(notes.metrics) } };
     return { ...known, ...(kind ? nodes(reader) : await cells(reader)) };
 }
 
@@ -136,6 +136,24 @@ class Reader {
 
 function expect(fine, what) {
     if (!fine) throw new Error(`expected ${what}`);
+}
+
+/** Options or metrics: numbers, true, false, null and short texts; under one name, an object of such. */
+function plain(value, nested) {
+    const notes = object(value === undefined ? {} : value);
+    const { [nested]: inner, ...own } = notes;
+    if (inner !== undefined) plain(inner);
+    const entries = Object.entries(own);
+    const isNumber = (item) => typeof item === "number" && Math.abs(item) <= 1e300;
+    const isPlain = (item) => item === null || typeof item === "boolean" || isNumber(item) || isText(item, 1000);
+    const fine = ([name, item]) => isText(name, 100) && isPlain(item);
+    expect(entries.length <= 64 && entries.every(fine), "plain notes: at most 64 numbers, true, false, null or texts, found others");
+    return notes;
+}
+
+/** Whether it is a text of at most so many code points, without halves of pairs. */
+function isText(value, most) {
+    return typeof value === "string" && [...value].length <= most && !/\p{Surrogate}/u.test(value);
 }
 
 function object(value) {

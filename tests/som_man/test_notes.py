@@ -1,0 +1,121 @@
+"""What a material file may note."""
+
+import json
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+from compact import material, sealed
+from helpers import complaint, must_fail, run
+
+from sommerl import load, save
+from sommerl.errors import FormatError
+from sommerl.som_man import notes
+from sommerl.som_man.file import decode, encode
+
+ESCAPES = "\x1b]0;x\x07\x9b31m\u202e\u200b\x7f"
+FINE = [
+    {},
+    {"options": {"clusters": 256, "alpha": 1, "rule": "paper", "new": None, "newer": True, "text": "ü" * 1000}},
+    {"metrics": {"rmse": 1e-300, "huge": -1e300}, "something else": [[1]]},
+    {"options": {"source_facts": {"reciprocal": True, "samples": 3, "coverage": 0.5, "later": "x"}}},
+]
+WRONG = [
+    {"options": {"source_facts": [1, 2]}},
+    {"options": {"source_facts": "abc"}},
+    {"options": {"source_facts": 5}},
+    {"options": {"source_facts": None}},
+    {"options": {"source_facts": {"asymmetry": {"a": [1]}}}},
+    {"options": {"source_facts": {"asymmetry": "str"}}},
+    {"options": {"source_facts": {"reciprocal": ESCAPES}}},
+    {"options": {"source_facts": {"reciprocal": 1}}},
+    {"options": {"source_facts": {"samples": 0.5}}},
+    {"options": {"source_facts": {"samples": True}}},
+    {"options": {"source_facts": {"coverage": None}}},
+    {"options": {"source_facts": {"new": {"source_facts": {}}}}},
+    {"options": {"a": [[[]]]}},
+    {"options": {"a": "x" * 1001}},
+    {"options": {"x" * 101: 1}},
+    {"options": {str(n): n for n in range(65)}},
+    {"options": {"clusters": "many"}},
+    {"options": {"a": 10**301}},
+    {"options": {"a": "\ud800"}},
+    {"options": None},
+    {"metrics": {"rmse": {"x": 1}}},
+    {"metrics": {"psnr": [1, 2]}},
+    {"metrics": {"rmse": "small"}},
+]
+
+
+def file(noted):
+    """The bytes of a file of nodes with such notes."""
+    data = noted if isinstance(noted, bytes) else json.dumps(noted).encode()
+    body = encode(material("minimal"))[10:]
+    at = 1 + 1 + body[1]
+    at += 1 + body[at]
+    assert body[at : at + 2] == b"\0\0"
+    return sealed(body[:at] + struct.pack("<H", len(data)) + data + body[at + 2 :])
+
+
+def check_is_refused(noted):
+    message = complaint(decode, file(noted))
+    assert message is not None
+    assert "expected" in message
+    assert message.isprintable()
+
+
+@pytest.mark.parametrize("noted", WRONG, ids=str)
+def test_notes_of_other_types_are_refused(noted):
+    check_is_refused(noted)
+    must_fail(check_is_refused, FINE[1])
+
+
+@pytest.mark.parametrize("noted", FINE, ids=str)
+def test_plain_notes_are_read(noted):
+    found = decode(file(noted))
+    assert (found.options, found.metrics) == (noted.get("options", {}), noted.get("metrics", {}))
+
+
+@pytest.mark.parametrize(
+    "noted",
+    [b'{"options":{"a":1e999}}', b'{"options":{"a":NaN}}', b'{"options":{"a":' + b"9" * 5000 + b"}}", b"[" * 30_000],
+)
+def test_numbers_without_end(noted):
+    check_is_refused(noted)
+
+
+def test_what_would_be_refused_is_not_written(tmp_path):
+    made = material("minimal")
+    made.options = {"source_facts": {"asymmetry": np.float64(0.5)}}
+    save(made, tmp_path / "x.smrl")
+    assert load(tmp_path / "x.smrl").facts == {"asymmetry": 0.5}
+    made.options = {"a": [1]}
+    with pytest.raises(FormatError, match="options: a: expected a number"):
+        save(made, tmp_path / "y.smrl")
+    assert not (tmp_path / "y.smrl").exists()
+
+
+def check_is_harmless(text):
+    assert all(c.isprintable() or c == "\n" for c in text)
+
+
+def test_no_text_of_a_file_gives_orders_to_a_terminal(capsys, tmp_path):
+    made = material("minimal")
+    made.name = f"na{ESCAPES}me"
+    made.options = {f"k{ESCAPES}": f"v{ESCAPES}", "source_facts": {f"x{ESCAPES}": ESCAPES}}
+    made.metrics = {f"m{ESCAPES}": ESCAPES}
+    path = tmp_path / f"file{ESCAPES}.smrl"
+    save(made, path)
+    status, out, err = run(capsys, "info", path)
+    assert status == 0
+    check_is_harmless(out + err)
+    must_fail(check_is_harmless, made.name)
+    for arguments in (["info", f"{path}x"], ["info", path, ESCAPES], ["convert", path, tmp_path / f"{ESCAPES}.smrl"]):
+        check_is_harmless("".join(run(capsys, *arguments)[1:]))
+    assert json.loads(run(capsys, "info", path, "--json")[1])["options"] == made.options
+
+
+def test_every_name_that_has_a_meaning_is_in_the_documentation():
+    written = (Path(__file__).parents[2] / "docs" / "format.md").read_text()
+    assert all(f"`{name}`" in written for group in notes.KNOWN.values() for name in group)
