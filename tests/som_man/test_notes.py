@@ -1,71 +1,28 @@
 """What a material file may note."""
 
 import json
-import struct
 from pathlib import Path
 
 import numpy as np
 import pytest
-from compact import material, sealed
+from compact import material
 from helpers import complaint, must_fail, run
+from noted import ESCAPES, FINE, MISTYPED, NOT_PLAIN, with_notes
 
 from sommerl import load, save
 from sommerl.errors import FormatError
 from sommerl.som_man import notes
-from sommerl.som_man.file import decode, encode
-
-ESCAPES = "\x1b]0;x\x07\x9b31m\u202e\u200b\x7f"
-FINE = [
-    {},
-    {"options": {"clusters": 256, "alpha": 1, "rule": "paper", "new": None, "newer": True, "text": "ü" * 1000}},
-    {"metrics": {"rmse": 1e-300, "huge": -1e300}, "something else": [[1]]},
-    {"options": {"source_facts": {"reciprocal": True, "samples": 3, "coverage": 0.5, "later": "x"}}},
-]
-WRONG = [
-    {"options": {"source_facts": [1, 2]}},
-    {"options": {"source_facts": "abc"}},
-    {"options": {"source_facts": 5}},
-    {"options": {"source_facts": None}},
-    {"options": {"source_facts": {"asymmetry": {"a": [1]}}}},
-    {"options": {"source_facts": {"asymmetry": "str"}}},
-    {"options": {"source_facts": {"reciprocal": ESCAPES}}},
-    {"options": {"source_facts": {"reciprocal": 1}}},
-    {"options": {"source_facts": {"samples": 0.5}}},
-    {"options": {"source_facts": {"samples": True}}},
-    {"options": {"source_facts": {"coverage": None}}},
-    {"options": {"source_facts": {"new": {"source_facts": {}}}}},
-    {"options": {"a": [[[]]]}},
-    {"options": {"a": "x" * 1001}},
-    {"options": {"x" * 101: 1}},
-    {"options": {str(n): n for n in range(65)}},
-    {"options": {"clusters": "many"}},
-    {"options": {"a": 10**301}},
-    {"options": {"a": "\ud800"}},
-    {"options": None},
-    {"metrics": {"rmse": {"x": 1}}},
-    {"metrics": {"psnr": [1, 2]}},
-    {"metrics": {"rmse": "small"}},
-]
-
-
-def file(noted):
-    """The bytes of a file of nodes with such notes."""
-    data = noted if isinstance(noted, bytes) else json.dumps(noted).encode()
-    body = encode(material("minimal"))[10:]
-    at = 1 + 1 + body[1]
-    at += 1 + body[at]
-    assert body[at : at + 2] == b"\0\0"
-    return sealed(body[:at] + struct.pack("<H", len(data)) + data + body[at + 2 :])
+from sommerl.som_man.file import decode
 
 
 def check_is_refused(noted):
-    message = complaint(decode, file(noted))
+    message = complaint(decode, with_notes(noted))
     assert message is not None
     assert "expected" in message
     assert message.isprintable()
 
 
-@pytest.mark.parametrize("noted", WRONG, ids=str)
+@pytest.mark.parametrize("noted", NOT_PLAIN + MISTYPED, ids=str)
 def test_notes_of_other_types_are_refused(noted):
     check_is_refused(noted)
     must_fail(check_is_refused, FINE[1])
@@ -73,7 +30,7 @@ def test_notes_of_other_types_are_refused(noted):
 
 @pytest.mark.parametrize("noted", FINE, ids=str)
 def test_plain_notes_are_read(noted):
-    found = decode(file(noted))
+    found = decode(with_notes(noted))
     assert (found.options, found.metrics) == (noted.get("options", {}), noted.get("metrics", {}))
 
 

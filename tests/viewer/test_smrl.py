@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from compact import CASES, arrays, broken, material, sealed
 from helpers import must_fail, tool
+from noted import FINE, NOT_PLAIN, with_notes
 
 from sommerl import Lattice, SomManBrdf
 from sommerl.container import PREFIX
@@ -117,3 +118,11 @@ def test_it_refuses_what_python_refuses(node, made):
     found, wanted = node(contents), list(map(described_or_none, contents))
     check_same(found, wanted)
     must_fail(check_same, found, [described(made), *wanted[1:]])
+
+
+def test_it_takes_the_notes_that_python_takes(node):
+    contents = [with_notes(noted) for noted in (*NOT_PLAIN, *FINE, b'{"options":{"a":1e999}}', b"[" * 30_000)]
+    found, wanted = node(contents), list(map(described_or_none, contents))
+    check_same([each and each["notes"] for each in found], [each and each["notes"] for each in wanted])
+    assert sum(each is None for each in wanted) == len(NOT_PLAIN) + 2
+    must_fail(check_same, found, [{}, *wanted[1:]])
