@@ -13,6 +13,8 @@ from typing import Any
 from . import console, plots
 from .brdf import Brdf, OnLattice
 from .describe import (
+    UNKNOWN,
+    clamped,
     compact_rows,
     compression_rows,
     describe,
@@ -130,10 +132,11 @@ def compact_one(brdf: Brdf, output: Path, options: CompactOptions, quiet: bool) 
         material, report = budget.compress(brdf, options, quality=_judge(brdf, options), progress=advance)
     written = smrl.save(material, output)
     result = describe(material, written) | {"options": asdict(options), "psnr_object_db": report.psnr_db}
-    result |= {"seconds": report.seconds, "cells_clamped": getattr(brdf, "cells_clamped", None), "output": str(output)}
+    counted = clamped(brdf)
+    result |= {"seconds": report.seconds, "output": str(output), **counted}
     result |= dict.fromkeys(("epochs", "quantisation_error", "units_dropped"))
     if not quiet:
-        console.print_rows(f"{material.name} → {output}", compact_rows(material, written, report))
+        console.print_rows(f"{material.name} → {output}", compact_rows(material, written, report, counted))
     return result
 
 
@@ -153,13 +156,13 @@ def info(options: Namespace) -> dict[str, Any]:
     on_disk = path.stat().st_size if path.is_file() else None
     result = describe(brdf, on_disk)
     if not options.json:
-        shown = {
-            key: value for key, value in result.items() if value not in (None, "", {}) and key not in ("facts", "lobes")
-        }
+        apart = ("facts", "lobes", *UNKNOWN)
+        shown = {key: value for key, value in result.items() if value not in (None, "", {}) and key not in apart}
         for key in ("bytes_paper", "bytes_memory", "bytes_disk"):
             if key in shown:
                 shown[key] = console.size(shown[key])
-        rows = {key: text(value) for key, value in shown.items()} | fact_rows(result["facts"] or {})
+        counted = {key: result[key] for key in UNKNOWN if result["cells_clamped"] is not None}
+        rows = {key: text(value) for key, value in shown.items()} | fact_rows(counted | (result["facts"] or {}))
         if isinstance(brdf, MultiLobe):
             rows |= {f"lobe {number}": str(lobe) for number, lobe in enumerate(brdf.lobes, 1)}
         console.print_rows(str(options.material), rows)
@@ -237,13 +240,14 @@ def factor(options: Namespace) -> dict[str, Any]:
         material = factored(brdf, chosen, progress=advance)
     seconds = time.perf_counter() - started
     written = fbrdf.save(material, options.output)
-    known = describe(material, written)
+    known = describe(material, written) | clamped(brdf)
     if not options.json:
         rows = {
             "lobes × terms": text(known["terms"]),
             "size in memory": console.size(material.bytes_memory),
             "size on disk": console.size(written),
             **fact_rows(known["facts"]),
+            **(fact_rows(clamped(brdf)) if known["cells_clamped"] else {}),
             "time": f"{seconds:.1f} s",
         }
         console.print_rows(f"{material.name} → {options.output}", rows)

@@ -9,7 +9,7 @@ from typing import Any
 from . import console
 from .brdf import Brdf
 from .commands import check_output, compress_one
-from .describe import fact_rows, trained
+from .describe import UNKNOWN, clamped, clamped_text, fact_rows, trained
 from .errors import OptionError
 from .formats import merl, rgl_export, scene, shader
 from .formats.scattered import ScatteredTable
@@ -45,10 +45,11 @@ def convert(options: Namespace) -> dict[str, Any]:
     else:
         written = _write(brdf, options, extension)
         size = output.stat().st_size
-        result = {"output": str(output), "bytes_disk": size, "cells_clamped": getattr(written, "cells_clamped", None)}
+        counted = UNKNOWN if extension in SNIPPETS else clamped(written)
+        result = {"output": str(output), "bytes_disk": size, **counted}
         if not options.json:
-            clamped = f", {result['cells_clamped']} cells clamped to 0" if result["cells_clamped"] else ""
-            console.say(f"{written.name} → {output} ({console.size(size)}{clamped})")
+            told = f", cells clamped to 0: {clamped_text(counted)}" if counted["cells_clamped"] else ""
+            console.say(f"{written.name} → {output} ({console.size(size)}{told})")
     if not options.json:
         _print_report(report | {"facts": {}} if "epochs" in result else report)
     return result | report

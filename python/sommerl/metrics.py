@@ -61,6 +61,19 @@ def table_metrics(reference: NDArray[np.float64], candidate: NDArray[np.float64]
     )
 
 
+def energy_share(part: NDArray[np.float64], whole: NDArray[np.float64], lattice: Lattice) -> float:
+    """∬ |part| cos cos dω dω over the same integral of |whole|: sums over the cells above the horizon of two tables of
+    shape `lattice.shape + (3,)`, channels added; numbers that are not finite count as 0. 0 if `whole` is black.
+    """
+    weight = np.where(lattice.above_horizon, lattice.solid_angles() * np.prod(lattice.cosines(), axis=0), 0.0)
+    largest = np.max(np.abs(whole), initial=0.0, where=np.isfinite(whole)) or 1.0  # squares of it have no place
+    sums = [
+        float((weight[..., None] * np.where(np.isfinite(values), np.abs(values) / largest, 0.0)).sum())
+        for values in (part, whole)
+    ]
+    return sums[0] / sums[1] if sums[1] else 0.0
+
+
 def asymmetry(f_r: Callable[[Triple, Triple], Triple]) -> float:
     """How far from reciprocal a BRDF is: ∬ |f(a, b) − f(b, a)| cos cos dω dω over the same integral of their mean,
     channels added. 0 for a reciprocal one, and for a black one.

@@ -82,7 +82,8 @@ def _layers(arrays: Mapping[str, NDArray[Any]], name: str) -> NeuralBrdf:
 def _numbers(array: NDArray[Any]) -> NDArray[np.float64]:
     if array.dtype.kind != "f":
         raise MaterialError(f"expected weights in floating point, found {array.dtype}")
-    return array.astype(np.float64)
+    with np.errstate(invalid="ignore"):  # of NaN that signals; NeuralBrdf refuses all NaN
+        return array.astype(np.float64)
 
 
 def _keras(path: Path, data: bytes) -> dict[str, NDArray[Any]]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .. import door
 from ..errors import FormatError
-from . import image_heads
+from . import hdr, image_heads
 from .llvm import mitsuba
 
 LARGEST_FILE = 2**30  # bytes
@@ -54,7 +54,6 @@ def load_environment(path: Path, warn: Callable[[str], None] = lambda sentence: 
     FormatError if it cannot be read, is larger than 2²⁶ pixels, is an image of low dynamic range (PNG, JPEG), or holds
     values that no light has.
     """
-    mi = mitsuba()
     data = door.read(path, LARGEST_FILE, "an environment image")
     kind = image_heads.kind_of(data)
     if kind == "LDR":
@@ -62,10 +61,7 @@ def load_environment(path: Path, warn: Callable[[str], None] = lambda sentence: 
         raise FormatError(f"{path}: expected radiance in numbers that go beyond white (.exr, .hdr), found an LDR image")
     try:
         image_heads.check(kind, data)
-        # From a file, and not from memory: Mitsuba's streams of memory have no end, and it would wait for one.
-        with door.copied(data, ".image") as copy:
-            bitmap = mi.Bitmap(str(copy), getattr(mi.Bitmap.FileFormat, kind))
-        linear = np.array(bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False))
+        linear = hdr.decode(data) if kind == "RGBE" else _decoded(data, kind)
     except FormatError:
         raise
     except Exception as error:  # of many kinds, as UnicodeDecodeError where its own sentence quotes the file
@@ -76,3 +72,12 @@ def load_environment(path: Path, warn: Callable[[str], None] = lambda sentence: 
     if width != 2 * height:
         warn(f"{path}: expected an environment twice as wide as high, found {width} × {height}: it is stretched")
     return linear
+
+
+def _decoded(data: bytes, kind: str) -> NDArray[np.float32]:
+    """Linear RGB, by Mitsuba. Raises whatever it does."""
+    mi = mitsuba()
+    # From a file, and not from memory: Mitsuba's streams of memory have no end, and it would wait for one.
+    with door.copied(data, ".image") as copy:
+        bitmap = mi.Bitmap(str(copy), getattr(mi.Bitmap.FileFormat, kind))
+    return np.array(bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False))

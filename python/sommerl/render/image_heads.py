@@ -9,12 +9,13 @@ import struct
 from collections.abc import Iterator
 from itertools import groupby
 
+from . import hdr
+
 MOST_PIXELS = 2**26  # 8192 × 8192
 MOST_VALUES = 2**28  # of all channels
 MOST_CHANNELS = 64
 LONGEST_HEAD = 2**20
 EXR, PFM = b"v/1\x01", (b"PF", b"Pf")
-HDR = b"#?RADIANCE", b"#?RGBE"
 LDR = b"\x89PNG", b"\xff\xd8\xff", b"BM", b"P3", b"P5", b"P6"
 PARTS, DEEP = 0x1000, 0x0800
 
@@ -23,7 +24,7 @@ def kind_of(data: bytes) -> str:
     """The name of the format, as Mitsuba calls it; "LDR" for one that holds no radiance, "" for any other."""
     if data.startswith(EXR):
         return "OpenEXR"
-    if data.startswith(HDR):
+    if data.startswith(hdr.MAGIC):
         return "RGBE"
     if data[:2] in PFM and data[2:3].isspace():
         return "PFM"
@@ -40,11 +41,8 @@ def check(kind: str, data: bytes) -> None:
 
 
 def _hdr(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Lines of text, and after an empty one the size."""
-    found = re.search(rb"\n-Y (\d{1,9}) \+X (\d{1,9})\n", data[:LONGEST_HEAD])
-    if not found:
-        raise ValueError("no line with a size, as -Y 512 +X 1024")
-    yield int(found[2]), int(found[1]), 3
+    width, height, _ = hdr.size(data)
+    yield width, height, 3
 
 
 def _pfm(data: bytes) -> Iterator[tuple[int, int, int]]:
