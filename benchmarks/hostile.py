@@ -145,9 +145,10 @@ def attack(reader: Reader, seconds: float, seed: int, folder: Path, out: Path | 
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             for whole in seeds:
+                accepted = report.accepted
                 _attempt(reader, path, whole, report, out)
-            if report.accepted < len(seeds):
-                report.faults["a whole file is refused"] = str(path)
+                if report.accepted == accepted:
+                    _fault(report, "a whole file is refused", path, out)
             _giant(reader, path, seeds[0], report, out)
             while time.monotonic() - started < seconds:
                 whole = rng.choice(seeds)
@@ -195,6 +196,9 @@ def _load(reader: Reader, path: Path, most: int, report: Report, out: Path | Non
         if isinstance(error, KeyboardInterrupt | SystemExit):
             raise
         _fault(report, f"{type(error).__name__}: {error}"[:200], path, out)  # a panic of the core
+    finally:
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, 0)
     report.mutations += 1
     report.slowest = max(report.slowest, time.perf_counter() - started)
     if Counted.bytes_read > most or Counted.opened > 1:

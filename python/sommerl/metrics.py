@@ -121,9 +121,15 @@ def image_metrics(reference: Pixels, candidate: Pixels, mask: Mask) -> ImageMetr
 
 
 def exposure(reference: Pixels, mask: Mask) -> float:
-    """The factor that brings the 90th percentile of the object's pixels' mean channel to 0.6."""
-    level = float(np.percentile(reference[mask].mean(axis=-1), EXPOSURE_PERCENTILE)) if mask.any() else 0.0
-    if not (np.isfinite(level) and level > 0):
+    """The factor that brings the 90th percentile of the object's pixels' mean channel to 0.6.
+
+    Raises MaterialError for an object that is black, or whose level is not finite.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):  # of infinite pixels
+        level = float(np.percentile(reference[mask].mean(axis=-1), EXPOSURE_PERCENTILE)) if mask.any() else 0.0
+    if not np.isfinite(level):
+        raise MaterialError("exposure: expected radiance that single precision can hold, found larger numbers or none")
+    if not level > 0:
         raise MaterialError("exposure: expected an object that reflects light, found a black one")
     return EXPOSED_TO / level
 

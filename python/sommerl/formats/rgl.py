@@ -33,6 +33,7 @@ from .spectra import srgb_weights
 LARGEST_SIDE = 4096  # of any grid in a file
 MOST_ANGLES = 1024
 MOST_WAVELENGTHS = 4096
+LARGEST = 1e30  # renderers calculate in single precision
 SMALLEST_COSINE = 0.01  # that a stored f_r cos θ_o is divided by
 
 
@@ -217,6 +218,9 @@ def parse(path: Path, data: bytes, *, reciprocal: bool = True) -> RglBrdf:
             raise FormatError(f"{path}: {name}: expected no negative values, and some above 0, found others")
     if not vndf[0].any(axis=(1, 2)).all():
         raise FormatError(f"{path}: vndf: expected a density for each theta_i, found zeros alone")
+    if np.abs(grid).max() > LARGEST:
+        found = f"{np.abs(grid).max():g}"
+        raise FormatError(f"{path}: {colours}: expected values from -{LARGEST:g} to {LARGEST:g}, found {found}")
     rgb = grid[0] if colours == "rgb" else _converted(path, file.array("wavelengths"), grid[0])
     return RglBrdf(
         theta_i,

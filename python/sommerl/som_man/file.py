@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from .. import _core, container, door
 from ..container import BYTE, Reader
-from ..errors import FormatError, SommerlError
+from ..errors import FormatError, MaterialError, OptionError, SommerlError
 from ..files import atomic_write
 from ..lattice import INTERPOLATIONS, Lattice
 from ..nodes import NodeLattice
@@ -53,7 +53,18 @@ def looks_like(head: bytes) -> bool:
 
 
 def save(material: SomManBrdf, path: str | Path) -> int:
-    """Writes a material file; returns its length [bytes]. Raises FormatError for what `load` would refuse."""
+    """Writes a material file (.smrl); returns its length [bytes].
+
+    Raises FormatError for what `load` would refuse, MaterialError for what is not compressed, OptionError for a name with
+    another extension.
+    """
+    if not isinstance(material, SomManBrdf):  # pyright: ignore[reportUnnecessaryIsInstance]
+        name = getattr(material, "name", "material")
+        raise MaterialError(
+            f"{name}: expected a compressed material, found {type(material).__name__}; sommerl.train makes one of it"
+        )
+    if Path(path).suffix.lower() != ".smrl":
+        raise OptionError(f"{path}: expected a name that ends in .smrl, found {Path(path).suffix!r}")
     notes.check(material.options, material.metrics)
     data = encode(material)
     with atomic_write(Path(path)) as out:
