@@ -187,9 +187,21 @@ def test_what_goes_below_zero_is_counted():
     assert 0 < table.energy_clamped < 0.2
 
 
-def test_what_is_too_large_for_single_precision_is_counted():
+@pytest.mark.parametrize("value", [1e39, -1e39, 1e308])
+def test_what_is_too_large_for_single_precision_is_refused(value):
     f_r = np.full((len(A), 3), 0.3)
-    f_r[:, 2] = 1e39
+    f_r[7, 2] = value
+    with pytest.raises(
+        FormatError, match="expected values that single precision can hold in every sample"
+    ):
+        to_table(Samples(A, B, f_r), name="x")
+
+
+@pytest.mark.parametrize("value", [3e38, -3e38, 1e-45])
+def test_the_largest_and_the_smallest_values(value):
+    """Planes between them may leave single precision: that is counted."""
+    f_r = np.full((len(A), 3), 0.3)
+    f_r[::5, 2] = value
     table = to_table(Samples(A, B, f_r), name="x")
-    check_counted(table, int(MERL.above_horizon.sum()), 1)
-    assert (table.values[..., 2] == 0).all()
+    assert np.isfinite(table.values).all()
+    assert 0 < table.energy_clamped <= 1

@@ -82,6 +82,9 @@ def to_table(samples: Samples, *, name: str, source_sha256: str | None = None, l
         raise FormatError(f"expected {2 * NEIGHBOURS} to {MOST_SAMPLES} samples, found {len(samples.wi)}")
     if not (np.isfinite(samples.f_r).all() and np.isfinite(samples.wi).all() and np.isfinite(samples.wo).all()):
         raise FormatError("expected finite numbers in every sample, found NaN or infinity")
+    if np.abs(samples.f_r).max() > LARGEST:  # and not set to 0, as in tables: its neighbours would be lost with it
+        found = f"{np.abs(samples.f_r).max():g}"
+        raise FormatError(f"expected values that single precision can hold in every sample, found one of {found}")
     lowest = np.minimum(samples.wi[:, 2], samples.wo[:, 2])
     if lowest.min() < -HORIZON:
         raise FormatError("expected directions above the horizon, found some below it")

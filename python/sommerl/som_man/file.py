@@ -55,8 +55,8 @@ def looks_like(head: bytes) -> bool:
 def save(material: SomManBrdf, path: str | Path) -> int:
     """Writes a material file (.smrl); returns its length [bytes].
 
-    Raises FormatError for what `load` would refuse, MaterialError for what is not compressed, OptionError for a name with
-    another extension.
+    Raises FormatError for what `load` would refuse, MaterialError for what is not compressed, OptionError for a name
+    with another extension.
     """
     if not isinstance(material, SomManBrdf):  # pyright: ignore[reportUnnecessaryIsInstance]
         name = getattr(material, "name", "material")
