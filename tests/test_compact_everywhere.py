@@ -179,4 +179,4 @@ def test_a_compressed_material_is_copied_as_it_is(capsys, path, tmp_path):
 
 def test_a_name_cannot_give_orders_to_a_terminal(tmp_path):
     save(compact_material(LATTICE, 5, 4, name="\x1b]0;evil\x07\nx"), tmp_path / "x.smrl")
-    assert load(tmp_path / "x.smrl").name == "�]0;evil��x"
+    assert load(tmp_path / "x.smrl").name == "�]0;evil� x"

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from helpers import lambertian_table, must_fail, random_directions, run_json
+from helpers import lambertian_table, must_fail, random_directions, run, run_json
 from rgl_files import content
 
-from sommerl import BrdfTable, Lattice, TrainOptions, builtin, commands, load, save, train
+from sommerl import MERL, BrdfTable, Lattice, TrainOptions, builtin, commands, load, save, train
 from sommerl.cli import main
 from sommerl.formats import merl
 
@@ -84,6 +84,41 @@ def test_rgl_to_merl(capsys, tmp_path):
     assert info["kind"] == "measurement"
     assert info["facts"] == result["facts"]
     assert len(info["source_sha256"]) == 64
+
+
+@pytest.fixture
+def negative(tmp_path):
+    """A measurement whose red is negative everywhere."""
+    rgb = np.full((1, 4, 3, 5, 5), 0.3, np.float32)
+    rgb[:, :, 0] = -0.1
+    (tmp_path / "x.bsdf").write_bytes(content(rgb=rgb))
+    return tmp_path / "x.bsdf"
+
+
+COUNTED = [
+    ["info", "{}"],
+    ["convert", "{}", "x.binary"],
+    ["convert", "{}", "y.bsdf"],
+    ["compress", "{}", "-o", "x.smrl", "--clusters", 2, "--epochs", 1],
+    ["factor", "{}", "-o", "x.fbrdf", "--lobes", 1, "--terms", 1],
+]
+
+
+def check_told(result):
+    assert result["cells_clamped"] == MERL.above_horizon.sum()
+    assert result["energy_clamped"] == pytest.approx(1 / 7, rel=1e-5)
+
+
+@pytest.mark.parametrize("arguments", COUNTED, ids=lambda words: " ".join(map(str, words)))
+def test_negative_measurements_are_told(capsys, negative, tmp_path, monkeypatch, arguments):
+    monkeypatch.chdir(tmp_path)
+    result = run_json(capsys, *(str(word).format(negative) for word in arguments))
+    check_told(result)
+    must_fail(check_told, result | {"cells_clamped": 0})
+    if "x.smrl" in arguments:
+        check_told(run_json(capsys, "info", "x.smrl"))
+    if arguments[0] == "info":
+        assert f"{MERL.above_horizon.sum()}" in run(capsys, "info", negative)[1]
 
 
 @pytest.mark.parametrize("extension", ["h", "hpp", "glsl", "hlsl"])

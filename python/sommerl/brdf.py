@@ -41,6 +41,11 @@ class Brdf(ABC):
         """Whether both orders of the directions give the same."""
         return True
 
+    def unclamped(self) -> Brdf:
+        """The same before anything was set to 0 that no material reflects, as negative numbers of measurements: itself,
+        unless the class says otherwise."""
+        return self
+
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name!r})"
 

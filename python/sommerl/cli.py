@@ -26,6 +26,7 @@ from .render.scenes import STAGES
 from .sampling.named import OURS, SAMPLERS
 from .som_man.budget import DEFAULT_PSNR, LARGEST_SIZE, SMALLEST_SIZE
 from .som_man.options import Order, Rule, Topology, TrainOptions
+from .visible import visible
 
 TRAIN_DEFAULTS, FIT_DEFAULTS, FACTOR_DEFAULTS = TrainOptions(), FitOptions(), FactorOptions()
 
@@ -55,7 +56,7 @@ class Parser(argparse.ArgumentParser):
     """Says what is wrong in one line."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(2, f"error: {message} (see {self.prog} --help)\n")
+        self.exit(2, f"error: {visible(message)} (see {self.prog} --help)\n")
 
     def _print_message(self, message: str, file: Any = None) -> None:
         """As argparse does, but that help which cannot be printed is an error."""

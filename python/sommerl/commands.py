@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from argparse import Namespace
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -13,6 +13,8 @@ from typing import Any
 from . import console, plots
 from .brdf import Brdf, OnLattice
 from .describe import (
+    UNKNOWN,
+    clamped,
     compact_rows,
     compression_rows,
     describe,
@@ -134,10 +136,11 @@ def compact_one(brdf: Brdf, output: Path, options: CompactOptions, quiet: bool) 
         material, report = budget.compress(brdf, options, quality=_judge(brdf, options), progress=advance)
     written = smrl.save(material, output)
     result = describe(material, written) | {"options": asdict(options), "psnr_object_db": report.psnr_db}
-    result |= {"seconds": report.seconds, "cells_clamped": getattr(brdf, "cells_clamped", None), "output": str(output)}
+    counted = clamped(brdf)
+    result |= {"seconds": report.seconds, "output": str(output), **counted}
     result |= dict.fromkeys(("epochs", "quantisation_error", "units_dropped"))
     if not quiet:
-        console.print_rows(f"{material.name} → {output}", compact_rows(material, written, report))
+        console.print_rows(f"{material.name} → {output}", compact_rows(material, written, report, counted))
     return result
 
 
@@ -158,11 +161,14 @@ def info(options: Namespace) -> dict[str, Any]:
     on_disk = path.stat().st_size if path.is_file() else None
     result = describe(brdf, on_disk)
     if not options.json:
-        shown = {key: value for key, value in result.items() if value not in (None, "", {}) and key not in HIDDEN}
+        apart = (*HIDDEN, *UNKNOWN)
+        shown = {key: value for key, value in result.items() if value not in (None, "", {}) and key not in apart}
         for key in ("bytes_paper", "bytes_memory", "bytes_disk"):
             if key in shown:
                 shown[key] = console.size(shown[key])
-        rows = {key: text(value) for key, value in shown.items()} | fact_rows(result["facts"] or {}) | origin_rows(brdf)
+        counted = {key: result[key] for key in UNKNOWN if result["cells_clamped"] is not None}
+        rows = {key: text(value) for key, value in shown.items()}
+        rows |= fact_rows(counted | (result["facts"] or {})) | origin_rows(brdf)
         if isinstance(brdf, MultiLobe):
             rows |= {f"lobe {number}": str(lobe) for number, lobe in enumerate(brdf.lobes, 1)}
         console.print_rows(str(options.material), rows)
@@ -174,7 +180,8 @@ def compare(options: Namespace) -> dict[str, Any]:
         check_output(options.output, (".png",), options.reference, options.candidate, options.envmap)
     reference, candidate = alike(load(options.reference), load(options.candidate), options.lookup)
     check_rendering(options)
-    environment = environment_of(options)
+    warnings = console.Warnings()
+    environment = environment_of(options, warnings)
     with console.progress("rendering") as advance:
         comparison = compare_on_sphere(
             reference,
@@ -189,7 +196,7 @@ def compare(options: Namespace) -> dict[str, Any]:
         write_image(options.output, side_by_side(comparison.pictures()))
     metrics = table_distance(reference, candidate)
     result = asdict(comparison.metrics) | {f"table_{name}": value for name, value in metrics.items()}
-    result |= {"reference": label(reference), "candidate": label(candidate)}
+    result |= {"reference": label(reference), "candidate": label(candidate), "warnings": warnings.told}
     if options.output:
         result["image"] = str(options.output)
     if not options.json:
@@ -239,7 +246,7 @@ def factor(options: Namespace) -> dict[str, Any]:
         material = factored(brdf, chosen, progress=advance)
     seconds = time.perf_counter() - started
     written = fbrdf.save(material, options.output)
-    known = describe(material, written)
+    known = describe(material, written) | clamped(brdf)
     if not options.json:
         rows = {
             "lobes × terms": text(known["terms"]),
@@ -247,6 +254,7 @@ def factor(options: Namespace) -> dict[str, Any]:
             "size on disk": console.size(written),
             **fact_rows(known["facts"]),
             **origin_rows(material),
+            **(fact_rows(clamped(brdf)) if known["cells_clamped"] else {}),
             "time": f"{seconds:.1f} s",
         }
         console.print_rows(f"{material.name} → {options.output}", rows)
@@ -262,7 +270,7 @@ def plot(options: Namespace) -> dict[str, Any]:
     figure, kinds = plots.sheet(materials, options.kind)
     plots.save(figure, options.output)
     if not options.json:
-        print(f"{', '.join(materials)} → {options.output} ({', '.join(kinds)})")
+        console.say(f"{', '.join(materials)} → {options.output} ({', '.join(kinds)})")
     return {"image": str(options.output), "kinds": kinds, "materials": list(materials)}
 
 
@@ -343,6 +351,6 @@ def goes_on_from(checkpoint: Checkpoint) -> Generator[console.Advance | None]:
         raise
 
 
-def environment_of(options: Namespace) -> Any:
+def environment_of(options: Namespace, warn: Callable[[str], None]) -> Any:
     """The environment asked for, or the built-in one."""
-    return load_environment(options.envmap) if options.envmap else default_environment()
+    return load_environment(options.envmap, warn) if options.envmap else default_environment()

@@ -6,7 +6,32 @@ import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 
+from .visible import visible
+
 Advance = Callable[[int, int], None]
+
+
+def say(*lines: str) -> None:
+    """Lines on standard output, as they can be shown: see `visible`."""
+    for line in lines:
+        print(visible(line))
+
+
+def tell(line: str) -> None:
+    """A line on standard error, as it can be shown. If that takes nothing, nobody is told: no reason to stop."""
+    with suppress(OSError):
+        print(visible(line), file=sys.stderr)
+
+
+class Warnings:
+    """Tells what is not as expected, and keeps it: `told`."""
+
+    def __init__(self) -> None:
+        self.told: list[str] = []
+
+    def __call__(self, sentence: str) -> None:
+        self.told.append(sentence)
+        tell(f"warning: {sentence}")
 
 
 @contextmanager
@@ -20,26 +45,12 @@ def progress(what: str) -> Generator[Advance | None]:
 
     columns = TextColumn("{task.description}", markup=False), BarColumn(), TextColumn("{task.percentage:>3.0f} %")
     with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=None)
+        task = bar.add_task(visible(what), total=None)
 
         def advance(done: int, total: int) -> None:
             bar.update(task, completed=done, total=total)
 
         yield advance
-
-
-class Warnings(list[str]):
-    """Sentences that were said on standard error."""
-
-    def say(self, sentence: str) -> None:
-        self.append(sentence)
-        tell(f"warning: {sentence}")
-
-
-def tell(line: str) -> None:
-    """Prints a line on standard error. If that takes nothing, nobody is told: no reason to stop."""
-    with suppress(OSError):
-        print(line, file=sys.stderr)
 
 
 def print_rows(title: str, rows: Mapping[str, str]) -> None:
@@ -48,11 +59,11 @@ def print_rows(title: str, rows: Mapping[str, str]) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(title=Text(title), show_header=False, title_justify="left")
+    table = Table(title=Text(visible(title)), show_header=False, title_justify="left")
     table.add_column()
     table.add_column(justify="right", overflow="fold")
     for name, value in rows.items():
-        table.add_row(Text(name), Text(value))
+        table.add_row(Text(visible(name)), Text(visible(value)))
     Console().print(table)
 
 
@@ -62,11 +73,11 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(title=Text(title), title_justify="left")
+    table = Table(title=Text(visible(title)), title_justify="left")
     for number, name in enumerate(columns):
         table.add_column(Text(name), justify="right" if number else "left", overflow="fold")
     for row in rows:
-        table.add_row(*map(Text, row))
+        table.add_row(*(Text(visible(cell)) for cell in row))
     Console().print(table)
 
 

@@ -20,7 +20,7 @@ from typing import Any, BinaryIO, TypeVar
 
 from .brdf import Brdf
 from .errors import FormatError, SommerlError
-from .files import visible
+from .visible import visible
 
 PREFIX = struct.Struct("<4sHI")
 BYTE = struct.Struct("<B")
@@ -65,14 +65,9 @@ def check(crc: int, data: bytes, magic: bytes, version: int, kind: str) -> None:
         raise FormatError("expected the checksum in the file, found another: the file is damaged or cut off")
 
 
-def load(path: str | Path, longest: int, decode: Callable[[bytes], Material]) -> Material:
-    """What `decode` makes of a file of at most `longest` bytes; its errors name the file."""
-    path = Path(path)
-    length = path.stat().st_size
-    if length > longest:
-        raise FormatError(f"{path}: expected at most {longest} bytes, found {length}")
+def named(path: Path, data: bytes, decode: Callable[[bytes], Material]) -> Material:
+    """What `decode` makes of a file's bytes; its errors name the file."""
     try:
-        data = path.read_bytes()
         material = decode(data)
     except SommerlError as error:
         raise FormatError(f"{path}: {error}") from error

@@ -9,7 +9,7 @@ from typing import Any
 from . import console
 from .brdf import Brdf
 from .commands import check_output, compress_one
-from .describe import fact_rows, trained
+from .describe import UNKNOWN, clamped, clamped_text, fact_rows, trained
 from .errors import OptionError
 from .formats import merl, rgl_export, scene, shader
 from .formats.scattered import ScatteredTable
@@ -45,11 +45,12 @@ def convert(options: Namespace) -> dict[str, Any]:
     else:
         written = _write(brdf, options, extension)
         size = output.stat().st_size if output.is_file() else None  # of what went through a pipe
-        result = {"output": str(output), "bytes_disk": size, "cells_clamped": getattr(written, "cells_clamped", None)}
+        counted = UNKNOWN if extension in SNIPPETS else clamped(written)
+        result = {"output": str(output), "bytes_disk": size, **counted}
         if not options.json:
-            clamped = f", {result['cells_clamped']} cells clamped to 0" if result["cells_clamped"] else ""
+            told = f", cells clamped to 0: {clamped_text(counted)}" if counted["cells_clamped"] else ""
             written_as = "through a pipe" if size is None else console.size(size)
-            print(f"{written.name} → {output} ({written_as}{clamped})")
+            console.say(f"{written.name} → {output} ({written_as}{told})")
     if not options.json:
         _print_report(report | {"facts": {}} if "epochs" in result else report)
     return result | report
@@ -105,8 +106,8 @@ def _report(brdf: Brdf, output: Path) -> dict[str, Any]:
 
 def _print_report(report: dict[str, Any]) -> None:
     for name, value in fact_rows(report.get("facts", {})).items():
-        print(f"  {name}: {value}")
+        console.say(f"  {name}: {value}")
     if report.get("coverage", 1) < MOSTLY:
-        print("  warning: most of this material is extrapolated")
+        console.say("  warning: most of this material is extrapolated")
     if "coverage_image" in report:
-        print(f"  where samples were missing: {report['coverage_image']}")
+        console.say(f"  where samples were missing: {report['coverage_image']}")

@@ -61,8 +61,8 @@ def demo(options: Namespace) -> dict[str, Any]:
     write_page(paths["page"], f"Sommerl: {material.name}", pictures, rows, note)
     if not options.json:
         console.print_rows(material.name, rows)
-        print("Wrote " + ", ".join(map(str, paths.values())))
-        print(f"Open {paths['page']} in a browser.")
+        console.say("Wrote " + ", ".join(map(str, paths.values())))
+        console.say(f"Open {paths['page']} in a browser.")
     return (
         describe(material, written)
         | asdict(report)

@@ -21,6 +21,7 @@ from .som_man.options import TrainOptions
 from .som_man.train import TrainReport, train
 from .table import BrdfTable
 
+UNKNOWN: dict[str, Any] = dict.fromkeys(("cells_clamped", "energy_clamped"))
 METRICS_DIGITS = 6  # so that the file does not hold the last bits of a machine's sums
 
 
@@ -31,9 +32,27 @@ def trained(table: BrdfTable, options: TrainOptions) -> tuple[SomManBrdf, TrainR
     metrics = table_metrics(table.values, material.values, table.lattice)
     measured = asdict(metrics) | {"quantisation_error": report.quantisation_error[-1]}
     material.metrics = {name: _rounded(value) for name, value in measured.items()}
-    if table.facts:
-        material.options["source_facts"] = {name: _rounded(value) for name, value in table.facts.items()}
+    facts = table.facts | (clamped(table) if table.cells_clamped else {})
+    if facts:
+        material.options["source_facts"] = {name: _rounded(value) for name, value in facts.items()}
     return material, report
+
+
+def clamped(brdf: Brdf, facts: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """How many cells of a material's source, and which share of their energy, had to be set to 0; None if unknown.
+
+    facts: of the material, if they are at hand.
+    """
+    if isinstance(brdf, BrdfTable):
+        return {"cells_clamped": brdf.cells_clamped, "energy_clamped": brdf.energy_clamped}
+    facts = brdf.facts if facts is None else facts
+    return {name: facts.get(name) for name in UNKNOWN}
+
+
+def clamped_text(counted: Mapping[str, Any]) -> str:
+    """The same for people; "" if there is nothing to say."""
+    cells, share = counted["cells_clamped"], counted["energy_clamped"]
+    return f"{cells} ({share:.2%} of the energy)" if cells else ""
 
 
 def describe(brdf: Brdf, bytes_disk: int | None) -> dict[str, Any]:
@@ -41,7 +60,7 @@ def describe(brdf: Brdf, bytes_disk: int | None) -> dict[str, Any]:
     known: dict[str, Any] = dict.fromkeys(
         ("clusters", "lattice", "nodes", "interpolation", "domain", "bytes_paper", "terms")
     )
-    known |= dict.fromkeys(("bytes_memory", "options", "metrics", "source_sha256", "cells_clamped", "lobes"))
+    known |= dict.fromkeys(("bytes_memory", "options", "metrics", "source_sha256", "lobes"))
     kind = "measurement" if isinstance(brdf, RglBrdf) else "model"
     if isinstance(brdf, SomManBrdf):
         kind = "som-man"
@@ -54,15 +73,16 @@ def describe(brdf: Brdf, bytes_disk: int | None) -> dict[str, Any]:
         known["lobes"] = [lobe.as_json() for lobe in brdf.lobes]
     if isinstance(brdf, BrdfTable):
         kind = "table"
-        known |= {"domain": "linear", "bytes_memory": brdf.values.nbytes, "cells_clamped": brdf.cells_clamped}
+        known |= {"domain": "linear", "bytes_memory": brdf.values.nbytes}
     if isinstance(brdf, (BrdfTable, SomManBrdf)):
         known |= {"lattice": list(brdf.lattice.shape), "interpolation": brdf.interpolation}
         if isinstance(brdf.lattice, NodeLattice):
             known["nodes"] = brdf.lattice.size
-    known["source_sha256"] = getattr(brdf, "source_sha256", None)
+    facts = brdf.facts
+    known |= {"source_sha256": getattr(brdf, "source_sha256", None), **clamped(brdf, facts)}
     known["made_from"] = [dict(link) for link in full_chain(brdf)] or None
     known["measured_against"] = _measured_against(brdf)
-    return {"kind": kind, "name": brdf.name, **known, "facts": brdf.facts or None, "bytes_disk": bytes_disk}
+    return {"kind": kind, "name": brdf.name, **known, "facts": facts or None, "bytes_disk": bytes_disk}
 
 
 def _measured_against(brdf: Brdf) -> dict[str, str] | None:
@@ -107,6 +127,9 @@ FACTS = {
     "asymmetry": "asymmetry: |f(a, b) − f(b, a)| over the mean",
     "reciprocal": "both orders averaged",
     "cells_near_grazing": "MERL cells where a cosine below 0.01 was taken for 0.01",
+    "cells_clamped": "cells with a channel below 0 or not finite, set to 0",
+    "energy_clamped": "share of the energy in that",
+    "samples_negative": "samples below 0 in a channel",
     "samples": "samples, at different directions",
     "samples_at_the_horizon": "samples at the horizon, left out",
     "mirrored": "one side measured, mirrored to the other",
@@ -142,13 +165,13 @@ def compression_rows(material: SomManBrdf, bytes_disk: int, report: TrainReport)
         "size in memory": console.size(material.bytes_memory),
         "size on disk": console.size(bytes_disk),
     }
-    if report.cells_clamped:
-        rows["cells clamped to 0"] = str(report.cells_clamped)
     return rows | origin_rows(material) | fact_rows(material.facts) | {"training": f"{report.seconds:.1f} s"}
 
 
-def compact_rows(material: SomManBrdf, bytes_disk: int, report: CompactReport) -> dict[str, str]:
-    """The same of the preset compact."""
+def compact_rows(
+    material: SomManBrdf, bytes_disk: int, report: CompactReport, counted: Mapping[str, Any]
+) -> dict[str, str]:
+    """The same of the preset compact. counted: what `clamped` says of the source."""
     rows = {
         "nodes": str(material.lattice.size),
         "palette": f"{len(material.gains)} gains, {len(material.lut)} shapes",
@@ -156,6 +179,8 @@ def compact_rows(material: SomManBrdf, bytes_disk: int, report: CompactReport) -
         "size in memory": console.size(material.bytes_memory),
         "size on disk": console.size(bytes_disk),
     }
+    if counted["cells_clamped"]:
+        rows |= fact_rows(counted)
     return rows | origin_rows(material) | {"time": f"{report.seconds:.1f} s"}
 
 
@@ -191,4 +216,4 @@ def print_fits(title: str, rows: Sequence[Mapping[str, Any]], fits: Sequence[Fit
         table.append([fit.model, *numbers])
     console.print_table(title, columns, table)
     for fit in fits:
-        print("\n  ".join([fit.model, *map(str, fit.brdf.lobes)]))
+        console.say(fit.model, *(f"  {lobe}" for lobe in fit.brdf.lobes))

@@ -1,8 +1,17 @@
 """Errors that a user can cause. Each message is one sentence: file, field, expected, found."""
 
+from __future__ import annotations
+
+from .visible import visible
+
+LONGEST = 2000  # characters of a sentence
+
 
 class SommerlError(Exception):
-    """Any error that is the input's fault and not the program's."""
+    """Any error that is the input's fault and not the program's. Its sentence can be shown: see `visible`."""
+
+    def __init__(self, sentence: str) -> None:
+        super().__init__(visible(sentence, LONGEST))
 
 
 class FormatError(SommerlError):

@@ -1,4 +1,4 @@
-"""Writing files: none is ever half-written, and none that is somebody else's is lost; and what is shown of names.
+"""Writing files: none is ever half-written, and none that is somebody else's is lost.
 
 A command (`keeping`) replaces what Sommerl wrote, which carries a mark (`MARKS`), and nothing else: no file of a
 measured format and none without such a mark, unless it is told to. As a library, Sommerl replaces any file, as
@@ -124,11 +124,6 @@ def remove_left_over(path: Path) -> None:
         return
     for temporary in left:
         _remove_if_left(temporary)
-
-
-def visible(name: str) -> str:
-    """A name without the characters that cannot be printed: terminals obey some of them."""
-    return "".join(c if c.isprintable() else "�" for c in name)
 
 
 def _target(path: Path) -> Path | None:

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-import zipfile
+import os
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
+from . import door
 from .brdf import Brdf, OnLattice
 from .errors import FormatError, MaterialError
 from .factored import file as fbrdf
 from .factored.material import FactoredBrdf
-from .formats import arrays_on_disk, cornell, fits, merl, nbrdf, rgl, samples
+from .formats import arrays_on_disk, cornell, fits, hdf5, merl, nbrdf, rgl, samples, tensor, text
 from .formats.names import split_member
 from .lattice import Interpolation
 from .materials import NAMES, builtin
 from .som_man import file as smrl
 from .table import BrdfTable
 
-HEAD_BYTES = 4096
+Parse = Callable[[Path, bytes], Brdf]
 # What `load` reads.
 EXTENSIONS = (".smrl", ".fbrdf", ".binary", ".bsdf", ".brdf", ".csv", ".npy", ".npz", ".h5", ".hdf5", ".json")
 
@@ -29,70 +31,65 @@ def load(source: str | Path) -> Brdf:
     a file in no known format, MaterialError for a name that is neither file nor built-in.
     """
     path, member = split_member(source)
-    if str(source) in NAMES and not path.is_file():
+    if not os.path.isfile(path) and str(source) in NAMES:
         return builtin(str(source))
-    if not path.exists():
-        if path.suffix or len(path.parts) > 1:
-            raise FormatError(f"{path}: expected a file, found none")
+    if not os.path.exists(path) and not path.suffix and len(path.parts) == 1:
         return builtin(str(source))  # says which name is nearest
-    if path.is_dir():
-        raise FormatError(f"{path}: expected a material file, found a directory")
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(HEAD_BYTES)
-        if not head:
+    with door.opened(path) as file:
+        if not file.head:
             raise FormatError(f"{path}: expected a material file, found an empty one")
-        return _read(path, head, member)
-    except OSError as error:
-        raise FormatError(f"{path}: cannot be read ({error.strerror or error})") from error
+        most, parse = _reader(path, file.head, member)
+        data = file.read(most)
+    return parse(path, data)
 
 
-def _read(path: Path, head: bytes, member: str) -> Brdf:
-    """The material in a file that starts with `head`."""
+def _reader(path: Path, head: bytes, member: str) -> tuple[int, Parse]:
+    """The longest file, and the reader, of the format that a file that starts with `head` is in."""
     if fits.looks_like(head):
-        return fits.read(path, member)
+        return fits.LARGEST_FILE, partial(fits.parse, member=member)
     if member and not head.startswith(arrays_on_disk.ZIP_MAGIC):
         raise FormatError(f"{path}: expected an archive of materials, to take {member} from it, found one material")
-    if smrl.looks_like(head):
-        return smrl.load(path)
-    if fbrdf.looks_like(head):
-        return fbrdf.load(path)
-    if rgl.looks_like(head):
-        return rgl.read(path)
-    if head.startswith(nbrdf.HDF5_MAGIC):
-        return nbrdf.read(path)
-    if head.startswith((arrays_on_disk.MAGIC, arrays_on_disk.ZIP_MAGIC)):
-        return _numpy(path, member)
-    if merl.looks_like(head):
-        return merl.read(path)
-    if cornell.looks_like(head):
-        return cornell.read(path)
-    if samples.looks_like(head):
-        return samples.read(path)
-    return _named(path)
-
-
-def _numpy(path: Path, member: str) -> Brdf:
-    """Samples or a neural BRDF, whichever the arrays are."""
-    if zipfile.is_zipfile(path):
-        sampled = samples.are_columns(arrays_on_disk.read_npz(path))
-    else:
-        array = arrays_on_disk.read_npy(path)
-        sampled = bool(array.dtype.names) or (array.ndim == 2 and array.shape[1] == len(samples.COLUMNS))
-    return samples.read(path) if sampled else nbrdf.read(path, member)
-
-
-def _named(path: Path) -> Brdf:
-    """A file whose content says nothing: its reader, by its name, says what is wrong with it."""
-    reader: dict[str, Callable[[Path], Brdf]] = {".binary": merl.read, ".bsdf": rgl.read, ".brdf": cornell.read}
-    reader |= {".csv": samples.read, ".json": fits.read}
-    reader |= dict.fromkeys((".npy", ".npz", ".h5", ".hdf5"), nbrdf.read)
-    if path.suffix.lower() in reader:
-        return reader[path.suffix.lower()](path)
+    for looks_like, most, parse in FORMATS:
+        if looks_like(head):
+            return most, partial(_numpy, member=member) if parse is _numpy else parse
+    # Its content says nothing: its reader, by its name, says what is wrong with it.
+    if path.suffix.lower() in BY_NAME:
+        return BY_NAME[path.suffix.lower()]
     raise FormatError(
         f"{path}: expected a material (.smrl, .fbrdf, MERL .binary, RGL .bsdf, Cornell .brdf, samples .csv .npy .npz, "
         "neural BRDF .npy .npz .h5, fits .json), found none of these"
     )
+
+
+def _numpy(path: Path, data: bytes, member: str = "") -> Brdf:
+    """Samples or a neural BRDF, whichever the arrays are."""
+    if data.startswith(arrays_on_disk.ZIP_MAGIC):
+        sampled = samples.are_columns(arrays_on_disk.read_npz(path, data))
+    else:
+        array = arrays_on_disk.read_npy(path, data)
+        sampled = bool(array.dtype.names) or (array.ndim == 2 and array.shape[1] == len(samples.COLUMNS))
+    return samples.parse(path, data) if sampled else nbrdf.parse(path, data, member)
+
+
+# What tells a format by a file's first bytes, the longest file, and its reader.
+FORMATS: tuple[tuple[Callable[[bytes], bool], int, Parse], ...] = (
+    (smrl.looks_like, smrl.LONGEST_FILE, smrl.parse),
+    (fbrdf.looks_like, fbrdf.LONGEST_FILE, fbrdf.parse),
+    (rgl.looks_like, tensor.LARGEST_FILE, rgl.parse),
+    (hdf5.looks_like, nbrdf.LARGEST_FILE, nbrdf.parse),
+    (arrays_on_disk.looks_like, arrays_on_disk.LARGEST_FILE, _numpy),
+    (merl.looks_like, merl.LARGEST_FILE, merl.parse),
+    (cornell.looks_like, text.LARGEST_FILE, cornell.parse),
+    (samples.looks_like, text.LARGEST_FILE, samples.parse),
+)
+BY_NAME: dict[str, tuple[int, Parse]] = {
+    ".binary": (merl.LARGEST_FILE, merl.parse),
+    ".bsdf": (tensor.LARGEST_FILE, rgl.parse),
+    ".brdf": (text.LARGEST_FILE, cornell.parse),
+    ".csv": (text.LARGEST_FILE, samples.parse),
+    ".json": (fits.LARGEST_FILE, fits.parse),
+    **dict.fromkeys((".npy", ".npz", ".h5", ".hdf5"), (nbrdf.LARGEST_FILE, nbrdf.parse)),
+}
 
 
 def interpolated(brdf: Brdf, interpolation: Interpolation) -> Brdf:

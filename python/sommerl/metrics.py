@@ -61,6 +61,19 @@ def table_metrics(reference: NDArray[np.float64], candidate: NDArray[np.float64]
     )
 
 
+def energy_share(part: NDArray[np.float64], whole: NDArray[np.float64], lattice: Lattice) -> float:
+    """∬ |part| cos cos dω dω over the same integral of |whole|: sums over the cells above the horizon of two tables of
+    shape `lattice.shape + (3,)`, channels added; numbers that are not finite count as 0. 0 if `whole` is black.
+    """
+    weight = np.where(lattice.above_horizon, lattice.solid_angles() * np.prod(lattice.cosines(), axis=0), 0.0)
+    largest = np.max(np.abs(whole), initial=0.0, where=np.isfinite(whole)) or 1.0  # squares of it have no place
+    sums = [
+        float((weight[..., None] * np.where(np.isfinite(values), np.abs(values) / largest, 0.0)).sum())
+        for values in (part, whole)
+    ]
+    return sums[0] / sums[1] if sums[1] else 0.0
+
+
 def asymmetry(f_r: Callable[[Triple, Triple], Triple]) -> float:
     """How far from reciprocal a BRDF is: ∬ |f(a, b) − f(b, a)| cos cos dω dω over the same integral of their mean,
     channels added. 0 for a reciprocal one, and for a black one.
@@ -108,9 +121,15 @@ def image_metrics(reference: Pixels, candidate: Pixels, mask: Mask) -> ImageMetr
 
 
 def exposure(reference: Pixels, mask: Mask) -> float:
-    """The factor that brings the 90th percentile of the object's pixels' mean channel to 0.6."""
-    level = float(np.percentile(reference[mask].mean(axis=-1), EXPOSURE_PERCENTILE)) if mask.any() else 0.0
-    if not (np.isfinite(level) and level > 0):
+    """The factor that brings the 90th percentile of the object's pixels' mean channel to 0.6.
+
+    Raises MaterialError for an object that is black, or whose level is not finite.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):  # of infinite pixels
+        level = float(np.percentile(reference[mask].mean(axis=-1), EXPOSURE_PERCENTILE)) if mask.any() else 0.0
+    if not np.isfinite(level):
+        raise MaterialError("exposure: expected radiance that single precision can hold, found larger numbers or none")
+    if not level > 0:
         raise MaterialError("exposure: expected an object that reflects light, found a black one")
     return EXPOSED_TO / level
 

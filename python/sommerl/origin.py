@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from .brdf import Brdf
 from .errors import FormatError
-from .files import visible
+from .visible import visible
 
 Link = Mapping[str, str]  #: "kind", "name" and "sha256" of a source
 

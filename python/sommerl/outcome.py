@@ -10,7 +10,7 @@ from typing import TextIO
 
 from .console import tell
 from .errors import OptionError, SommerlError
-from .files import visible
+from .visible import visible
 
 DEBUG = "SOMMERL_DEBUG"
 LONGEST = 300  # characters of what an error that nobody thought of says

@@ -11,7 +11,6 @@ from typing import Any
 from .commands import MOST_SPP, check_apart, check_output, check_range, goes_on_from
 from .console import Warnings
 from .errors import OptionError
-from .formats.names import sha256_of
 from .render import scene_file
 from .render.checkpoint import Checkpoint, checkpoint_of
 from .render.llvm import mitsuba
@@ -46,14 +45,14 @@ def scene_of(options: Namespace) -> Path | None:
 
 def render(path: Path, options: Namespace) -> dict[str, Any]:
     """Renders a scene file."""
-    warnings = Warnings()
+    warn = Warnings()
     parameters = _parameters(options.define)
     check_range("seed", options.seed, 0, 2**64 - 1)
     if options.spp is not None:
         check_range("spp", options.spp, 1, MOST_SPP)
     check_output(options.output, (".png", ".exr"), path)
     variant = mitsuba(options.variant).variant()
-    with scene_file.warnings_to(warnings.say):
+    with scene_file.warnings_to(warn):
         scene = scene_file.load(path, parameters)
         spp = scene.samples if options.spp is None else options.spp
         check_range(f"{path}: sample_count", spp, 1, MOST_SPP)
@@ -62,14 +61,14 @@ def render(path: Path, options: Namespace) -> dict[str, Any]:
         files = scene_file.files_of(path, parameters)
         for written in (options.output, checkpoint_of(options.output)):
             check_apart(written, path, *files.values())
-        identity = {"scene": sha256_of(path)} | {f"-D {name}": value for name, value in parameters.items()}
-        identity |= {f"file {name}": sha256_of(file) for name, file in files.items()}
+        identity = {"scene": scene_file.digest_of(path)} | {f"-D {name}": value for name, value in parameters.items()}
+        identity |= {f"file {name}": scene_file.digest_of(file) for name, file in files.items()}
         width, height = scene.size
         checkpoint = Checkpoint(
             checkpoint_of(options.output),
             identity,
             (height, width),
-            warnings.say,
+            warn,
             channels=scene_file.channels_held(scene),
         )
         started = time.perf_counter()
@@ -82,7 +81,7 @@ def render(path: Path, options: Namespace) -> dict[str, Any]:
         print(f"{path} → {options.output} ({seconds:.1f} s)")
     result = {"image": str(options.output), "seconds": seconds, "spp": spp, "variant": variant, "scene": str(path)}
     result |= {"size": list(scene.size), "channels": scene_file.channels_of(bitmap), "files": list(files)}
-    return result | {"resumed": checkpoint.resumed, "warnings": list(warnings)}
+    return result | {"resumed": checkpoint.resumed, "warnings": warn.told}
 
 
 def _parameters(definitions: list[str]) -> dict[str, str]:

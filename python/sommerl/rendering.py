@@ -116,8 +116,7 @@ def render(options: Namespace) -> dict[str, Any]:
 
 def _render(options: Namespace) -> dict[str, Any]:
     """Renders one of the scenes that come along."""
-    warnings = Warnings()
-    warn = warnings.say
+    warn = Warnings()
     check_rendering(options)
     pairs = _pairs(options)
     outputs = _outputs(options, pairs)
@@ -157,10 +156,10 @@ def _render(options: Namespace) -> dict[str, Any]:
     checkpoint.remove()
     if not options.json:
         shown = ", ".join(result["materials"][:3]) + (f" and {len(labels) - 3} more" if labels[3:] else "")
-        print(f"{shown} → {options.output} ({seconds:.1f} s)")
+        console.say(f"{shown} → {options.output} ({seconds:.1f} s)")
         if rows:
             console.print_rows(f"{result['candidate']} against {result['reference']}", rows)
-    return result | {"warnings": list(warnings)}
+    return result | {"warnings": warn.told}
 
 
 def _outputs(options: Namespace, pairs: Sequence[Pair]) -> dict[str, Path]:
@@ -252,7 +251,7 @@ def _setting(options: Namespace, warn: Callable[[str], None]) -> Setting:
     mesh = load_mesh(options.mesh) if options.mesh else None
     if mesh and mesh.found:
         warn(mesh.found)
-    return Setting(environment_of(options) if taken.environment else None, mesh)
+    return Setting(environment_of(options, warn) if taken.environment else None, mesh)
 
 
 def _rendered(

@@ -15,6 +15,7 @@ from .brdf import Brdf, Buffers, OnLattice
 from .errors import MaterialError
 from .half_diff import directions
 from .lattice import MERL, Interpolation, Lattice, checked
+from .metrics import energy_share
 from .origin import source_of
 
 
@@ -23,7 +24,8 @@ class BrdfTable(OnLattice):
 
     values: f_r [1/sr], linear RGB, float64, of shape `lattice.shape + (3,)`. Above the horizon, negative and
         non-finite values of the input become 0 and are counted in `cells_clamped`; cells below the horizon,
-        which hold no measurement, continue the last cell above it (`Lattice.extended`).
+        which hold no measurement, continue the last cell above it (`Lattice.extended`). `energy_clamped` is the share
+        of the energy that they held (`metrics.energy_share`), as finite numbers without their sign.
     interpolation: "trilinear", or "nearest" as in the paper.
     source_sha256: of the file that the table was read from; of the values where there is none.
 
@@ -47,6 +49,7 @@ class BrdfTable(OnLattice):
         self.values: NDArray[np.float64] = lattice.extended(f_r)
         # Not true, either, of NaN. Renderers calculate in single precision.
         unusable = ~((self.values >= 0) & (self.values <= np.finfo(np.float32).max))
+        share = energy_share(np.where(unusable, self.values, 0.0), self.values, lattice) if unusable.any() else 0.0
         self.values[unusable] = 0.0
         if not (self.values > 0).any():
             raise MaterialError("expected a positive, finite reflectance above the horizon, found none")
@@ -54,18 +57,21 @@ class BrdfTable(OnLattice):
         self.lattice = lattice
         self.interpolation: Interpolation = checked(interpolation)
         self.cells_clamped = int(unusable[lattice.above_horizon].any(axis=-1).sum())
+        self.energy_clamped = share
         self.source_sha256 = source_sha256 or hashlib.sha256(self.values.astype("<f8").tobytes()).hexdigest()
 
     @classmethod
     def sample(cls, brdf: Brdf, lattice: Lattice = MERL) -> BrdfTable:
         """The table of a BRDF's values at the cell centres above the horizon.
 
-        On a reciprocal lattice, the mean of both orders of the directions.
+        On a reciprocal lattice, the mean of both orders of the directions. What the BRDF itself sets to 0 is counted,
+        too (`Brdf.unclamped`).
         """
         above = lattice.above_horizon
         wi, wo = directions(*(angle[above] for angle in lattice.angles()))
         values = np.zeros((*lattice.shape, 3))
-        found = brdf.eval_both_orders if lattice.reciprocal else brdf.eval
+        source = brdf.unclamped()
+        found = source.eval_both_orders if lattice.reciprocal else source.eval
         values[above] = found(np.stack(wi, -1), np.stack(wo, -1))
         return cls(values, lattice, name=brdf.name)
 

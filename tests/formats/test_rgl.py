@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rgl_files import content, fields
 
-from sommerl import load
+from sommerl import MERL, load
 from sommerl.errors import FormatError
 from sommerl.formats import rgl, tensor
 from sommerl.formats.spectra import srgb_weights
@@ -82,6 +82,36 @@ def test_near_grazing_it_stays_finite(tmp_path):
     assert brdf.facts["cells_near_grazing"] > 10_000
     assert rgl.read(tmp_path / "x.bsdf", reciprocal=False).facts["cells_near_grazing"] < 10_000
     assert BrdfTable.sample(brdf).cells_clamped == 0
+
+
+def check_counts(brdf, cells, energy):
+    table = BrdfTable.sample(brdf)
+    found = {"cells_clamped": table.cells_clamped, "energy_clamped": table.energy_clamped}
+    assert found == {key: brdf.facts[key] for key in found}
+    assert (found["cells_clamped"], found["energy_clamped"]) == (cells, pytest.approx(energy, rel=1e-6))
+
+
+def test_negative_numbers_are_counted_where_the_mean_of_both_orders_drops_them(tmp_path):
+    rgb = np.full((1, 4, 3, 5, 5), 0.3, np.float32)
+    rgb[:, :, 0] = -0.1
+    cells = int(MERL.above_horizon.sum())
+    brdf = load(written(tmp_path / "x.bsdf", content(rgb=rgb)))
+    check_counts(brdf, cells, 1 / 7)
+    must_fail(check_counts, brdf, 0, 0.0)
+    assert (brdf.eval(A, B)[:, 0] == 0).all()
+    assert np.array_equal(brdf.unclamped().eval(A, B)[:, 1:], brdf.eval(A, B)[:, 1:])
+    assert (brdf.unclamped().eval(A, B)[:, 0] < 0).all()
+    check_counts(load(written(tmp_path / "y.bsdf", content(rgb=np.abs(rgb)))), 0, 0.0)
+
+
+def test_a_negative_number_in_one_order_is_not_counted_if_the_mean_is_none(tmp_path):
+    """What is dropped is counted, not what is in the file."""
+    rgb = np.full((1, 4, 3, 5, 5), 0.3, np.float32)
+    rgb[0, 3, 1] = -0.001
+    brdf = load(written(tmp_path / "x.bsdf", content(rgb=rgb)))
+    table = BrdfTable.sample(brdf)
+    raw = BrdfTable.sample(rgl.read(tmp_path / "x.bsdf", reciprocal=False))
+    assert 0 <= table.cells_clamped == raw.cells_clamped < MERL.above_horizon.sum() / 2
 
 
 def test_it_renders(tmp_path):

@@ -165,3 +165,41 @@ def test_scipy_is_asked_for_by_a_sentence(monkeypatch):
     monkeypatch.setattr("sommerl.optional.importlib.import_module", missing)
     with pytest.raises(MissingDependencyError, match=r"install sommerl\[formats\]"):
         to_table(sampled(builtin("red-fabric")), name="x")
+
+
+def check_counted(table, cells, energy):
+    assert (table.cells_clamped, table.energy_clamped) == (cells, pytest.approx(energy, abs=1e-6))
+
+
+def test_what_goes_below_zero_is_counted():
+    above = int(MERL.above_horizon.sum())
+    f_r = np.full((len(A), 3), 0.3)
+    check_counted(to_table(Samples(A, B, f_r), name="x"), 0, 0)
+    table = to_table(Samples(A, B, f_r * [1, -1, 0.5]), name="x")
+    check_counted(table, above, 1 / 2.5)
+    assert (table.values[..., 1] == 0).all()
+    assert table.facts["samples_negative"] == len(A)
+    must_fail(check_counted, table, 0, 0)
+    few = np.where((A[:, 2] > 0.95)[:, None], -f_r, f_r)
+    table = to_table(Samples(A, B, few), name="x")
+    assert table.facts["samples_negative"] == (A[:, 2] > 0.95).sum()
+    assert 0 < table.cells_clamped < above / 2
+    assert 0 < table.energy_clamped < 0.2
+
+
+@pytest.mark.parametrize("value", [1e39, -1e39, 1e308])
+def test_what_is_too_large_for_single_precision_is_refused(value):
+    f_r = np.full((len(A), 3), 0.3)
+    f_r[7, 2] = value
+    with pytest.raises(FormatError, match="expected values that single precision can hold in every sample"):
+        to_table(Samples(A, B, f_r), name="x")
+
+
+@pytest.mark.parametrize("value", [3e38, -3e38, 1e-45])
+def test_the_largest_and_the_smallest_values(value):
+    """Planes between them may leave single precision: that is counted."""
+    f_r = np.full((len(A), 3), 0.3)
+    f_r[::5, 2] = value
+    table = to_table(Samples(A, B, f_r), name="x")
+    assert np.isfinite(table.values).all()
+    assert 0 < table.energy_clamped <= 1

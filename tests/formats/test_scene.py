@@ -142,6 +142,15 @@ def test_names_that_are_no_text(tmp_path):
             scene.write(tmp_path / name, tmp_path / f"x.{extension}")
 
 
+@pytest.mark.parametrize("name", ["a\x1b[2J", "a\nb", "a\u202eb", "a\udcff"])
+def test_names_that_xml_cannot_hold_or_nobody_can_see(tmp_path, name):
+    (tmp_path / f"{name}.smrl").write_bytes(b"")
+    with pytest.raises(FormatError, match="expected names of characters that can be printed"):
+        scene.write(tmp_path / f"{name}.smrl", tmp_path / "x.xml")
+    scene.write(tmp_path / f"{name}.smrl", tmp_path / "x.json")
+    assert json.loads((tmp_path / "x.json").read_text())["filename"] == str(tmp_path / f"{name}.smrl")
+
+
 def test_a_built_in_is_named(tmp_path):
     scene.write("nickel", tmp_path / "x.json")
     check_place(tmp_path / "x.json", "nickel")

@@ -1,10 +1,13 @@
+import contextlib
+
 import numpy as np
 import pytest
-from helpers import SMALL, lambertian_table, must_fail
+from helpers import SMALL, complaint, lambertian_table, must_fail
 
 from sommerl import BrdfTable, TrainOptions, load, save, train
 from sommerl.errors import FormatError
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
+from sommerl.render import hdr
 from sommerl.render.compare import compare_on_sphere
 from sommerl.render.environment import LIGHTS, default_environment, load_environment
 from sommerl.render.images import (
@@ -144,6 +147,103 @@ def test_images_that_are_no_lights_are_refused(tmp_path):
             load_environment(tmp_path / name)
     mi.Bitmap(default_environment(8)).write(str(tmp_path / "a.hdr"))
     assert load_environment(tmp_path / "a.hdr").shape == (8, 16, 3)
+
+
+def exr(radiance):
+    """The bytes of an image, and where in them its window's numbers are."""
+    data = encode(radiance)
+    return bytearray(data), data.index(b"dataWindow\0box2i\0") + 21
+
+
+def test_images_that_are_not_twice_as_wide_as_high_are_told(tmp_path):
+    told = []
+    write_image(tmp_path / "probe.exr", default_environment(16))
+    load_environment(tmp_path / "probe.exr", told.append)
+    assert told == []
+    write_image(tmp_path / "square.exr", np.ones((16, 16, 3), np.float32))
+    assert load_environment(tmp_path / "square.exr", told.append).shape == (16, 16, 3)
+    assert told == [
+        f"{tmp_path / 'square.exr'}: expected an environment twice as wide as high, found 16 × 16: it is stretched"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 8 +X 16\n" + bytes(1000)),
+        ("a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 100000 +X 200000\n" + bytes(1000)),
+        ("a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n"),
+        ("a.pfm", b"PF\n100000 50000\n-1\n" + bytes(1000)),
+        ("a.pfm", b"PF\n0 0\n-1\n"),
+        ("a.exr", b"v/1\x01"),
+        ("a.exr", b"v/1\x01\x02\0\0\0" + b"x" * 100),
+    ],
+)
+def test_heads_that_ask_for_too_much_or_nothing(tmp_path, name, content):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(FormatError, match=f"{name}: expected an environment image, found something unreadable"):
+        load_environment(tmp_path / name)
+
+
+def check_window_is_refused(path, change):
+    data, at = exr(default_environment(8))
+    data[at : at + 16] = change(np.frombuffer(data[at : at + 16], "<i4")).astype("<i4").tobytes()
+    path.write_bytes(bytes(data))
+    assert complaint(load_environment, path) == f"{path}: expected an environment image, found something unreadable"
+
+
+def test_windows_of_images(tmp_path):
+    path = tmp_path / "x.exr"
+    check_window_is_refused(path, lambda window: window + np.array([0, 0, 10**6, 10**6]))
+    check_window_is_refused(path, lambda window: window * 0 - 1)
+    check_window_is_refused(path, lambda window: np.array([-(2**31), -(2**31), 2**31 - 1, 2**31 - 1]))
+    must_fail(check_window_is_refused, path, lambda window: window)
+
+
+def hdr_of(radiance):
+    stream = mi.MemoryStream()
+    mi.Bitmap(np.ascontiguousarray(radiance)).write(stream, mi.Bitmap.FileFormat.RGBE)
+    return bytes(stream.raw_buffer())
+
+
+def check_hdr(found, data, folder):
+    (folder / "by_mitsuba.hdr").write_bytes(data)
+    assert np.array_equal(found, np.array(mi.Bitmap(str(folder / "by_mitsuba.hdr"))))
+
+
+@pytest.mark.parametrize("height", [3, 4, 16, 200])
+def test_radiance_files_hold_what_mitsuba_finds_in_them(tmp_path, height):
+    """In runs and, where lines are short, without."""
+    radiance = default_environment(height) * np.where(np.arange(2 * height) % 5 == 4, 1e-30, 1e9)[:, None]
+    data = hdr_of(radiance.astype(np.float32))
+    check_hdr(hdr.decode(data), data, tmp_path)
+    must_fail(check_hdr, hdr.decode(data) * np.float32(1.001), data, tmp_path)
+
+
+def test_damaged_runs(tmp_path):
+    """Each byte of a line, changed: Mitsuba's decoder writes beyond its memory for some."""
+    data = hdr_of(default_environment(8))
+    _, _, at = hdr.size(data)
+    assert data[at : at + 2] == b"\2\2"
+    for place in range(at, at + 100):
+        for value in (0, 1, 127, 128, 129, 255):
+            changed = data[:place] + bytes([value]) + data[place + 1 :]
+            with contextlib.suppress(ValueError):
+                assert hdr.decode(changed).shape == (8, 16, 3)
+    for length in range(at, len(data)):
+        with pytest.raises(
+            ValueError, match=r"a line of another width|runs that do not make up a line|buffer is smaller"
+        ):
+            hdr.decode(data[:length])
+
+
+def test_names_of_channels_that_are_no_text(tmp_path):
+    """Mitsuba quotes them in its own sentence, and fails over it."""
+    data, _ = exr(default_environment(8))
+    at = data.index(b"chlist\0") + 11
+    data[at] = 0xA9
+    (tmp_path / "x.exr").write_bytes(bytes(data))
+    assert "found something unreadable" in str(complaint(load_environment, tmp_path / "x.exr"))
 
 
 def test_images_are_written_and_read_back(tmp_path):

@@ -9,13 +9,13 @@ import compact
 import numpy as np
 import pytest
 from compact import arrays, broken, same_numbers, sealed
-from helpers import SMALL, must_fail, random_directions
+from helpers import SMALL, lambertian_table, must_fail, random_directions
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sommerl import Lattice, SomManBrdf, SommerlError, TrainOptions, load, save, train
 from sommerl.container import PREFIX
-from sommerl.errors import FormatError, MaterialError
+from sommerl.errors import FormatError, MaterialError, OptionError
 from sommerl.nodes import NodeLattice
 from sommerl.som_man.file import CELLS_HEAD, LONGEST_NOTES, NODES_HEAD, decode, encode
 
@@ -55,6 +55,17 @@ def plain(head, contents, *, kind=0, notes=b""):
 def deflated(payload):
     packer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
     return packer.compress(payload) + packer.flush()
+
+
+def test_only_compressed_materials_are_saved_and_under_their_extension(material, tmp_path):
+    with pytest.raises(
+        MaterialError, match=r"lambertian: expected a compressed material, found BrdfTable; sommerl.train"
+    ):
+        save(lambertian_table(), tmp_path / "x.smrl")
+    for name in ("x.binary", "x", "smrl"):
+        with pytest.raises(OptionError, match=f"{name}: expected a name that ends in .smrl, found"):
+            save(material, tmp_path / name)
+    assert not list(tmp_path.iterdir())
 
 
 def cell_parts(material):

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from compact import CASES, HOSTILE_STREAMS, arrays, bomb, broken, material, sealed, stream, written
 from helpers import must_fail, tool
+from noted import FINE, NOT_PLAIN, with_notes
 
 from sommerl import Lattice, SomManBrdf
 from sommerl.container import PREFIX
@@ -213,3 +214,11 @@ def test_no_file_is_longer(node, tmp_path):
     with pytest.raises(FormatError, match=f"expected at most {length - 1} bytes, found {length}"):
         file.load(path)
     assert node([bytes(length)]) == [f"expected at most {length - 1} bytes, found {length}"]
+
+
+def test_it_takes_the_notes_that_python_takes(node):
+    contents = [with_notes(noted) for noted in (*NOT_PLAIN, *FINE, b'{"options":{"a":1e999}}', b"[" * 30_000)]
+    found, wanted = node(contents), list(map(read, contents))
+    check_same(found, wanted)
+    assert sum(isinstance(each, str) for each in wanted) == len(NOT_PLAIN) + 2
+    must_fail(check_same, found, ["", *wanted[1:]])

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import container
+from .. import container, door
 from ..container import Reader
 from ..errors import FormatError, SommerlError
 from ..files import atomic_write
@@ -45,7 +45,12 @@ def save(material: FactoredBrdf, path: str | Path) -> int:
 
 def load(path: str | Path) -> FactoredBrdf:
     """The factored BRDF in a file. Raises FormatError if it is not one, or is damaged, or is of another version."""
-    return container.load(path, LONGEST_FILE, decode)
+    return parse(Path(path), door.read(path, LONGEST_FILE))
+
+
+def parse(path: Path, data: bytes) -> FactoredBrdf:
+    """The same of a file's bytes."""
+    return container.named(path, data, decode)
 
 
 def encode(material: FactoredBrdf) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import zipfile
 import zlib
@@ -19,18 +20,23 @@ MAGIC, ZIP_MAGIC = b"\x93NUMPY", b"PK\x03\x04"
 LARGEST_ARRAY = 2**28  # bytes
 MOST_HEADER = 4096  # bytes: many fields take some
 MOST_ARRAYS, MOST_AXES = 4096, 8
+LARGEST_FILE = LARGEST_ARRAY + 2**20  # bytes: with the names of all arrays
 
 
-def read_npy(path: Path) -> NDArray[Any]:
-    """The array in a .npy file. Raises FormatError."""
-    with path.open("rb") as stream:
-        return _array(path, "array", stream, path.stat().st_size)
+def looks_like(head: bytes) -> bool:
+    """Whether a file that starts with these bytes says that it is one of the two."""
+    return head.startswith((MAGIC, ZIP_MAGIC))
 
 
-def read_npz(path: Path) -> dict[str, NDArray[Any]]:
-    """The arrays in a .npz file, by name. Raises FormatError."""
+def read_npy(path: Path, data: bytes) -> NDArray[Any]:
+    """The array in a .npy file's bytes. Raises FormatError."""
+    return _array(path, "array", io.BytesIO(data), len(data))
+
+
+def read_npz(path: Path, data: bytes) -> dict[str, NDArray[Any]]:
+    """The arrays in a .npz file's bytes, by name. Raises FormatError."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = archive.infolist()
             if len(members) > MOST_ARRAYS or sum(member.file_size for member in members) > LARGEST_ARRAY:
                 raise FormatError(f"{path}: expected at most {MOST_ARRAYS} arrays of {LARGEST_ARRAY} bytes, found more")

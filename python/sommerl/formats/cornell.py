@@ -6,17 +6,19 @@ Text, of which "#" starts a comment: the number of wavelengths; the wavelengths 
 
 from __future__ import annotations
 
+import hashlib
 import re
 from pathlib import Path
 
 import numpy as np
 
+from .. import door
 from ..errors import FormatError
 from ..table import BrdfTable
-from .names import printable, sha256_of
+from ..visible import visible
 from .scattered import Samples, to_table
 from .spectra import srgb_weights
-from .text import rows, text_of, uncommented
+from .text import LARGEST_FILE, rows, text_of, uncommented
 
 MOST_WAVELENGTHS = 1000
 
@@ -29,8 +31,12 @@ def looks_like(head: bytes) -> bool:
 
 def read(path: str | Path) -> BrdfTable:
     """The table of a Cornell file. Raises FormatError if it is not one, MissingDependencyError without `formats`."""
-    path = Path(path)
-    lines = uncommented(text_of(path))
+    return parse(Path(path), door.read(path, LARGEST_FILE))
+
+
+def parse(path: Path, data: bytes) -> BrdfTable:
+    """The same of a file's bytes."""
+    lines = uncommented(text_of(path, data))
     if not lines or not re.fullmatch(r"\d{1,9}", lines[0]) or not 2 <= int(lines[0]) <= MOST_WAVELENGTHS:
         found = repr(lines[0][:20]) if lines else "nothing"
         raise FormatError(f"{path}: number of wavelengths: expected 2 to {MOST_WAVELENGTHS}, found {found}")
@@ -49,8 +55,8 @@ def read(path: str | Path) -> BrdfTable:
     try:
         return to_table(
             Samples.at_angles(samples[:, :4], samples[:, 4:] @ srgb_weights(nanometres)),
-            name=printable(path.stem),
-            source_sha256=sha256_of(path),
+            name=visible(path.stem),
+            source_sha256=hashlib.sha256(data).hexdigest(),
         )
     except FormatError as error:
         raise FormatError(f"{path}: {error}") from error

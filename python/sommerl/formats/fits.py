@@ -10,9 +10,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
+from .. import door
 from ..errors import FormatError, MaterialError
-from ..files import atomic_write, visible
+from ..files import atomic_write
 from ..models.multi_lobe import FAMILIES, Lobe, MultiLobe
+from ..visible import visible
 
 KEY, VERSION = "sommerl_fits", 1
 LARGEST_FILE = 2**24  # bytes
@@ -35,11 +37,13 @@ def write(path: Path, material: str, fits: Sequence[Mapping[str, Any]]) -> None:
 
 def read(path: str | Path, member: str = "") -> MultiLobe:
     """One of the fits in a file. member: its model; the first if empty. Raises FormatError."""
-    path = Path(path)
-    if path.stat().st_size > LARGEST_FILE:
-        raise FormatError(f"{path}: expected at most {LARGEST_FILE} bytes, found {path.stat().st_size}")
+    return parse(Path(path), door.read(path, LARGEST_FILE), member)
+
+
+def parse(path: Path, data: bytes, member: str = "") -> MultiLobe:
+    """The same of a file's bytes."""
     try:
-        found = json.loads(path.read_bytes())
+        found = json.loads(data)
     except (ValueError, RecursionError) as error:
         raise FormatError(f"{path}: expected JSON, found something else ({error})") from error
     top = _mapping(path, "the file", found)
@@ -52,7 +56,7 @@ def read(path: str | Path, member: str = "") -> MultiLobe:
     if not fits:
         raise FormatError(f"{path}: fits: expected one or more, found none")
     if member and member not in models:
-        raise FormatError(f"{path}: expected one of {', '.join(models[:20])}, found {visible(member)}")
+        raise FormatError(f"{path}: expected one of {', '.join(models[:20])}, found {member}")
     at = models.index(member) if member else 0
     try:
         lobes = [_lobe(path, lobe) for lobe in _sequence(path, "parameters", fits[at].get("parameters"))]

@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import door
 from ..brdf import Brdf
 from ..errors import FormatError, MaterialError
 from ..files import atomic_write
 from ..lattice import Lattice
 from ..table import BrdfTable
-from .names import printable
+from ..visible import visible
 
 LATTICES: dict[tuple[int, ...], Lattice] = {
     (90, 90, 180): Lattice(),
@@ -44,24 +45,25 @@ def looks_like(head: bytes) -> bool:
 
 def read(path: str | Path) -> MerlTable:
     """The table in a MERL file. Raises FormatError if it is not one, MaterialError if nothing in it is positive."""
-    path = Path(path)
-    length = path.stat().st_size
-    if length < HEADER_BYTES:
-        raise FormatError(f"{path}: expected a MERL header of {HEADER_BYTES} bytes, found {length}")
-    with path.open("rb") as stream:
-        dimensions = _dimensions(stream.read(HEADER_BYTES))
+    return parse(Path(path), door.read(path, LARGEST_FILE))
+
+
+def parse(path: Path, data: bytes) -> MerlTable:
+    """The same of a file's bytes."""
+    if len(data) < HEADER_BYTES:
+        raise FormatError(f"{path}: expected a MERL header of {HEADER_BYTES} bytes, found {len(data)}")
+    dimensions = _dimensions(data)
     if dimensions not in LATTICES:
         known = " or ".join("×".join(map(str, known)) for known in LATTICES)
         raise FormatError(f"{path}: expected MERL dimensions {known}, found {'×'.join(map(str, dimensions))}")
     lattice = LATTICES[dimensions]
     expected = bytes_on_disk(lattice)
-    if length != expected:
-        raise FormatError(f"{path}: expected {expected} bytes for these dimensions, found {length}")
-    data = path.read_bytes()
+    if len(data) != expected:
+        raise FormatError(f"{path}: expected {expected} bytes for these dimensions, found {len(data)}")
     digest = hashlib.sha256(data).hexdigest()
     planes = np.frombuffer(data, "<f8", offset=HEADER_BYTES).reshape(3, *lattice.shape)
     try:
-        table = MerlTable(_scaled(planes), lattice, name=printable(path.stem), source_sha256=digest)
+        table = MerlTable(_scaled(planes), lattice, name=visible(path.stem), source_sha256=digest)
     except MaterialError as error:
         raise MaterialError(f"{path}: {error}") from error
     table.planes = planes
@@ -71,6 +73,9 @@ def read(path: str | Path) -> MerlTable:
 def bytes_on_disk(lattice: Lattice) -> int:
     """The length of a MERL file with that lattice."""
     return HEADER_BYTES + 3 * 8 * lattice.size
+
+
+LARGEST_FILE = max(map(bytes_on_disk, LATTICES.values()))
 
 
 def resampled(brdf: Brdf) -> BrdfTable:

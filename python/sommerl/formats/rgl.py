@@ -9,25 +9,31 @@ vectors, and the reflectance times cosine, relative to that density, on a grid o
 
 from __future__ import annotations
 
+import hashlib
+from copy import copy
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import door
 from ..arrays import Array, Triple, ops
 from ..brdf import Brdf, Buffers
 from ..errors import FormatError
 from ..half_diff import TWO_PI, directions
 from ..lattice import MERL
 from ..metrics import asymmetry
+from ..table import BrdfTable
+from ..visible import visible
 from . import tensor
-from .names import printable, sha256_of
 from .spectra import srgb_weights
 
 LARGEST_SIDE = 4096  # of any grid in a file
 MOST_ANGLES = 1024
 MOST_WAVELENGTHS = 4096
+LARGEST = 1e30  # renderers calculate in single precision
 SMALLEST_COSINE = 0.01  # that a stored f_r cos θ_o is divided by
 
 
@@ -57,7 +63,7 @@ class RglBrdf(Brdf):
         source_sha256: str = "",
     ) -> None:
         self.name = name
-        self._reciprocal = reciprocal
+        self._reciprocal, self._clamped = reciprocal, reciprocal
         self.source_sha256 = source_sha256
         self._theta_i = np.asarray(theta_i, np.float64)
         self._shapes = {"vndf": vndf.shape[1:], "rgb": rgb.shape[2:], "ndf": ndf.shape, "sigma": sigma.shape}
@@ -80,10 +86,24 @@ class RglBrdf(Brdf):
     def buffers(self) -> dict[str, NDArray[Any]]:
         return self._buffers
 
+    def unclamped(self) -> RglBrdf:
+        """The same with the file's negative numbers, also in the mean of both orders."""
+        other = copy(self)
+        other._clamped = False
+        return other
+
+    @cached_property
+    def _cut(self) -> dict[str, Any]:
+        """How many of MERL's cells, and which share of their energy, the mean of both orders sets to 0."""
+        if not (self._clamped and (self._buffers["rgb"] < 0).any()):
+            return {"cells_clamped": 0, "energy_clamped": 0.0}
+        table = BrdfTable.sample(self)
+        return {"cells_clamped": table.cells_clamped, "energy_clamped": table.energy_clamped}
+
     @property
     def facts(self) -> dict[str, Any]:
-        """How far from reciprocal the measurement is, and how many of MERL's cells that are not 0 the bound on cosines
-        makes smaller.
+        """How far from reciprocal the measurement is; how many of MERL's cells that are not 0 the bound on cosines
+        makes smaller; how many have a channel that is negative and taken for 0, and its share of the energy.
 
         asymmetry: see `metrics.asymmetry`.
         """
@@ -92,7 +112,8 @@ class RglBrdf(Brdf):
         divided = np.minimum(cos_i, cos_o) if self.reciprocal else cos_i
         near = MERL.above_horizon & (divided < SMALLEST_COSINE)
         touched = np.any(self.f_r(*directions(*(angle[near] for angle in MERL.angles())), self._buffers), axis=0)
-        return {"reciprocal": self.reciprocal, "asymmetry": one_sided, "cells_near_grazing": int(touched.sum())}
+        known = {"reciprocal": self.reciprocal, "asymmetry": one_sided, "cells_near_grazing": int(touched.sum())}
+        return known | self._cut
 
     def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
         forward = self._raw(wo, wi, buffers)
@@ -100,8 +121,8 @@ class RglBrdf(Brdf):
             return forward
         f = ops(wi[0])
         backward = self._raw(wi, wo, buffers)
-        r, g, b = (f.maximum((x + y) * 0.5, 0.0) for x, y in zip(forward, backward, strict=True))
-        return r, g, b
+        r, g, b = ((x + y) * 0.5 for x, y in zip(forward, backward, strict=True))
+        return (f.maximum(r, 0.0), f.maximum(g, 0.0), f.maximum(b, 0.0)) if self._clamped else (r, g, b)
 
     def _raw(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
         """f_r with `wi` as the file's incident direction."""
@@ -175,8 +196,12 @@ def read(path: str | Path, *, reciprocal: bool = True) -> RglBrdf:
 
     A spectral file is converted to linear sRGB. reciprocal: see `RglBrdf`.
     """
-    path = Path(path)
-    file = tensor.TensorFile(path)
+    return parse(Path(path), door.read(path, tensor.LARGEST_FILE), reciprocal=reciprocal)
+
+
+def parse(path: Path, data: bytes, *, reciprocal: bool = True) -> RglBrdf:
+    """The same of a file's bytes."""
+    file = tensor.TensorFile(path, data)
     colours = "rgb" if "rgb" in file.fields else "spectra"
     _check(file, colours)
     theta_i, phi_i = file.array("theta_i"), file.array("phi_i")
@@ -193,6 +218,9 @@ def read(path: str | Path, *, reciprocal: bool = True) -> RglBrdf:
             raise FormatError(f"{path}: {name}: expected no negative values, and some above 0, found others")
     if not vndf[0].any(axis=(1, 2)).all():
         raise FormatError(f"{path}: vndf: expected a density for each theta_i, found zeros alone")
+    if np.abs(grid).max() > LARGEST:
+        found = f"{np.abs(grid).max():g}"
+        raise FormatError(f"{path}: {colours}: expected values from -{LARGEST:g} to {LARGEST:g}, found {found}")
     rgb = grid[0] if colours == "rgb" else _converted(path, file.array("wavelengths"), grid[0])
     return RglBrdf(
         theta_i,
@@ -202,8 +230,8 @@ def read(path: str | Path, *, reciprocal: bool = True) -> RglBrdf:
         sigma,
         jacobian=bool(file.array("jacobian")[0]),
         reciprocal=reciprocal,
-        name=printable(path.stem),
-        source_sha256=sha256_of(path),
+        name=visible(path.stem),
+        source_sha256=hashlib.sha256(data).hexdigest(),
     )
 
 

@@ -8,6 +8,7 @@ this order and radians; an .npz file an array for each name.
 
 from __future__ import annotations
 
+import hashlib
 import re
 from pathlib import Path
 from typing import Any
@@ -15,12 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import door
 from ..errors import FormatError
 from ..table import BrdfTable
+from ..visible import visible
 from . import arrays_on_disk
-from .names import printable, sha256_of
 from .scattered import Samples, to_table
-from .text import rows, text_of, uncommented
+from .text import LARGEST_FILE, rows, text_of, uncommented
 
 ANGLES = ("theta_i", "phi_i", "theta_o", "phi_o")
 COLUMNS = (*ANGLES, "r", "g", "b")
@@ -41,24 +43,26 @@ def are_columns(names: Any) -> bool:
 
 def read(path: str | Path) -> BrdfTable:
     """The table of a file of samples. Raises FormatError if it is not one, MissingDependencyError without SciPy."""
-    path = Path(path)
-    with path.open("rb") as stream:
-        head = stream.read(8)
-    if head.startswith(arrays_on_disk.MAGIC):
-        columns = _fields(path, arrays_on_disk.read_npy(path))
-    elif head.startswith(arrays_on_disk.ZIP_MAGIC):
-        columns = arrays_on_disk.read_npz(path)
+    return parse(Path(path), door.read(path, max(LARGEST_FILE, arrays_on_disk.LARGEST_FILE)))
+
+
+def parse(path: Path, data: bytes) -> BrdfTable:
+    """The same of a file's bytes."""
+    if data.startswith(arrays_on_disk.MAGIC):
+        columns = _fields(path, arrays_on_disk.read_npy(path, data))
+    elif data.startswith(arrays_on_disk.ZIP_MAGIC):
+        columns = arrays_on_disk.read_npz(path, data)
     else:
-        columns = _text(path)
+        columns = _text(path, data)
     try:
         samples = _samples(columns)
-        return to_table(samples, name=printable(path.stem), source_sha256=sha256_of(path))
+        return to_table(samples, name=visible(path.stem), source_sha256=hashlib.sha256(data).hexdigest())
     except FormatError as error:
         raise FormatError(f"{path}: {error}") from error
 
 
-def _text(path: Path) -> dict[str, NDArray[Any]]:
-    header, lines = _header(text_of(path))
+def _text(path: Path, data: bytes) -> dict[str, NDArray[Any]]:
+    header, lines = _header(text_of(path, data))
     if header is None:
         raise FormatError(f"{path}: expected a first line with the names of columns, as theta_i_deg, found none")
     names = _split(header)

@@ -18,7 +18,7 @@ from ..errors import FormatError, MaterialError
 from ..half_diff import directions, half_diff, spherical
 from ..interrupt import undisturbed
 from ..lattice import MERL, Lattice
-from ..metrics import LOG_FLOOR
+from ..metrics import LOG_FLOOR, energy_share
 from ..optional import optional
 from ..table import BrdfTable
 from ..threads import limit
@@ -34,6 +34,7 @@ MOST_HELD_OUT = 5000
 SAME = 1e-4  # samples whose coordinates agree to that are one, measured several times
 IN_PLANE = np.radians(0.5)  # azimuths between 0 and this, or this and π, lie on neither side of the plane of incidence
 MOST_SAMPLES = 2_000_000
+LARGEST = float(np.finfo(np.float32).max)  # that a table holds
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,11 @@ class ScatteredTable(BrdfTable):
 def to_table(samples: Samples, *, name: str, source_sha256: str | None = None, lattice: Lattice = MERL) -> BrdfTable:
     """The table nearest to so many samples. Those at the horizon itself, where nothing can be measured, are left out.
 
-    Its facts: samples, those at different directions; samples_at_the_horizon, those left out; mirrored, whether they
+    Planes may go below 0, where samples do or between them: such cells are set to 0 and counted in `cells_clamped`,
+    among the table's own cells those that are interpolated from one.
+
+    Its facts: samples, those at different directions; samples_at_the_horizon, those left out; samples_negative, those
+    with a channel below 0, which the planes are fitted to as they are; mirrored, whether they
     lay on one side of the plane of incidence, and stand for the other, too; coverage, the share of the lattice above
     the horizon, by solid angle and cosines, that is measured; held_out_…, how far the tenth part of the samples, left
     out, was from what the others say there.
@@ -79,9 +84,13 @@ def to_table(samples: Samples, *, name: str, source_sha256: str | None = None, l
         raise FormatError(f"expected {2 * NEIGHBOURS} to {MOST_SAMPLES} samples, found {len(samples.wi)}")
     if not (np.isfinite(samples.f_r).all() and np.isfinite(samples.wi).all() and np.isfinite(samples.wo).all()):
         raise FormatError("expected finite numbers in every sample, found NaN or infinity")
+    if np.abs(samples.f_r).max() > LARGEST:  # and not set to 0, as in tables: its neighbours would be lost with it
+        found = f"{np.abs(samples.f_r).max():g}"
+        raise FormatError(f"expected values that single precision can hold in every sample, found one of {found}")
     lowest = np.minimum(samples.wi[:, 2], samples.wo[:, 2])
     if lowest.min() < -HORIZON:
         raise FormatError("expected directions above the horizon, found some below it")
+    negative = int((samples.f_r[lowest > HORIZON] < 0).any(axis=1).sum())
     samples = _merged(samples.some(lowest > HORIZON))
     if len(samples.wi) < 2 * NEIGHBOURS:
         raise FormatError(f"expected samples at {2 * NEIGHBOURS} different directions, found {len(samples.wi)}")
@@ -97,6 +106,7 @@ def to_table(samples: Samples, *, name: str, source_sha256: str | None = None, l
         raise FormatError("expected a positive reflectance in some sample, found none") from error
     fine = BrdfTable.sample(fitted, lattice)
     table = ScatteredTable(fine.values, lattice, name=name, source_sha256=source_sha256)
+    table.cells_clamped, table.energy_clamped = _clamped(coarse, values, table)
     near = np.zeros(coarse.shape, bool)
     near[above] = _near(both, wi, wo)
     table.samples = samples
@@ -105,12 +115,29 @@ def to_table(samples: Samples, *, name: str, source_sha256: str | None = None, l
     table.source_facts = {
         "samples": len(samples.wi),
         "samples_at_the_horizon": int((lowest <= HORIZON).sum()),
+        "samples_negative": negative,
         "mirrored": mirrored,
         "coverage": float((weight * table.measured).sum() / weight.sum()),
         "cells_not_measured": int((lattice.above_horizon & ~table.measured).sum()),
         **_held_out(samples),
     }
     return table
+
+
+def _clamped(coarse: Lattice, values: NDArray[np.float64], table: BrdfTable) -> tuple[int, float]:
+    """How many cells of a table above the horizon are interpolated from values, of a coarse lattice, that had to be set
+    to 0; and the share of the energy that these held."""
+    values = coarse.extended(values)
+    changed = ~((values >= 0) & (values <= LARGEST))
+    if not changed.any():
+        return 0, 0.0
+    size = np.where(changed & np.isfinite(values), np.minimum(np.abs(values), LARGEST), 0.0)
+    touched, lost = (
+        BrdfTable.sample(BrdfTable(each, coarse), table.lattice).values if each.any() else np.zeros_like(table.values)
+        for each in (changed.astype(np.float64), size)
+    )
+    cells = (touched > 0).any(axis=-1) & table.lattice.above_horizon
+    return int(cells.sum()), energy_share(lost, table.values + lost, table.lattice)
 
 
 def _merged(samples: Samples) -> Samples:
@@ -159,7 +186,8 @@ def _regression(samples: Samples, wi: Triple, wo: Triple) -> NDArray[np.float64]
     known, wanted = _coordinates(split(samples.wi), split(samples.wo)), _coordinates(wi, wo)
     tree = _tree(known)
     parts = [_planes(tree, known, domain, part) for part in np.array_split(wanted, -(-len(wanted) // AT_ONCE))]
-    return np.concatenate(parts) ** 3
+    with np.errstate(over="ignore"):  # a table sets what is too large to 0, and counts it
+        return np.concatenate(parts) ** 3
 
 
 def _planes(

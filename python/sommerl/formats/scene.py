@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-import re
 from pathlib import Path
 from typing import Any, cast
 from xml.sax.saxutils import quoteattr
 
+from .. import door
 from ..errors import FormatError
-from ..files import atomic_write, visible
-from .names import printable, split_member
+from ..files import atomic_write
+from ..visible import visible
+from .names import split_member
 
 HEAD = """\
 <!-- Written by Sommerl. The material's file is named relative to this one. A scene with this file in it:
@@ -26,7 +27,6 @@ COMMENT = (
     "from sommerl.render.llvm import mitsuba; from sommerl.render.bsdf import register, snippet; "
     "mi = mitsuba(); register(); bsdf = mi.load_dict(snippet({path}))"
 )
-CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")  # which no XML file may have
 LONGEST = 2**16  # bytes of a .json
 
 
@@ -43,17 +43,17 @@ def write(material: str | Path, path: str | Path) -> None:
         # Where the folders really are: from behind a link, ".." leads elsewhere.
         place = os.path.relpath(Path(os.path.realpath(file.parent)) / file.name, os.path.realpath(path.parent))
         name = Path(place).as_posix() + (f":{member}" if member else "")
-    for text in (name, path.stem) if xml else ():
-        if "$" in text or CONTROLS.search(text):
+    for text in (name, path.name) if xml else ():
+        if "$" in text or visible(text) != text:
             raise FormatError(
-                f"{path}: expected names without $ and control characters, which Mitsuba's XML cannot hold, found "
-                f"{visible(text)}; .json can"
+                f"{path}: expected names without $, of characters that can be printed, which is what Mitsuba's XML "
+                f"takes, found {text}; .json takes others"
             )
     text = _xml(name, path) if xml else _json(name, path)
     try:
         data = text.encode()
     except UnicodeEncodeError as error:
-        raise FormatError(f"{path}: expected names in UTF-8, found {printable(name)}") from error
+        raise FormatError(f"{path}: expected names in UTF-8, found {name}") from error
     with atomic_write(path) as out:
         out.write(data)
 
@@ -80,12 +80,8 @@ def read(path: str | Path) -> dict[str, Any]:
     Raises FormatError if it is none.
     """
     path = Path(path)
-    if not path.is_file():
-        raise FormatError(f"{path}: expected a snippet, found no file")
-    with path.open("rb") as file:
-        data = file.read(LONGEST + 1)
     try:
-        found = json.loads(data)
+        found = json.loads(door.read(path, LONGEST, "a snippet"))
     except (ValueError, RecursionError) as error:
         raise FormatError(f"{path}: expected JSON, found something else ({error})") from error
     snippet = cast("dict[str, Any]", found) if isinstance(found, dict) else {}

@@ -22,11 +22,13 @@ from ..files import atomic_write
 from ..lattice import Lattice
 from ..nodes import ABOVE, BELOW, FINE, HALF_PI, KNEE, SMALLEST_COSINE
 from ..sampling import half_vector
+from ..visible import visible
 from . import shader_text as text
 from .shader_text import CPP, GLSL, HLSL, Language
 
 LANGUAGES = {".h": CPP, ".hpp": CPP, ".glsl": GLSL, ".hlsl": HLSL}
 A_LINE = 10  # numbers
+LONGEST_TITLE = 300
 OF_SAMPLER = ("ROWS", "COLUMNS", "ELEVATIONS", "CELLS", "SLOTS", "SLOT_BITS", "WHOLE", "TINY", "LOWEST", "SMALLEST")
 
 
@@ -65,8 +67,14 @@ def write(material: OnLattice, path: str | Path) -> None:
 def identifier(name: str) -> str:
     """A name that all three languages take; if letters had to go, with a number in their place."""
     plain = re.sub(r"[^0-9A-Za-z]+", "_", name).strip("_")
-    lost = not name.isascii()
-    return "_".join(part for part in ("material", plain, f"{zlib.crc32(name.encode()):08x}" if lost else "") if part)
+    lost = "" if name.isascii() else f"{zlib.crc32(name.encode('utf-8', 'surrogatepass')):08x}"
+    return "_".join(part for part in ("material", plain, lost) if part)
+
+
+def comment(text: str) -> str:
+    """A text that a comment ends after, and not in: no line's end, nothing that joins lines (also as C once wrote it,
+    "??/"), and no end of a comment of another kind."""
+    return re.sub(r"\s+", " ", re.sub(r"\\|\?(?=\?)|\*(?=/)", " ", visible(text, LONGEST_TITLE)))
 
 
 def source(material: OnLattice, language: Language, name: str) -> str:
@@ -87,11 +95,10 @@ def source(material: OnLattice, language: Language, name: str) -> str:
     undefined = "".join(f"#undef {macro}\n" for macro in for_the_next_file)
     whole = text.HEAD.replace("@CONTENTS@", parts.contents) + language.before + "\n"
     whole += "\n".join(_guarded(array, language) for array in arrays) + functions + language.after + undefined
-    title = re.sub(r"\s+", " ", "".join(c if c.isprintable() and c != "\\" else " " for c in material.name))
     values = parts.values | {constant: repr(getattr(half_vector, constant)) for constant in OF_SAMPLER}
     values |= {
-        "TITLE": title,
-        "SHA": material.source_sha256 or "unknown",
+        "TITLE": comment(material.name),
+        "SHA": comment(material.source_sha256) or "unknown",
         "NAME": name,
         "CALL": f"{name}::" if language is CPP else f"{name}_",
         "MACROS": " and ".join((", ".join(f"{macro}(i)" for macro in macros[:-1]), f"{macros[-1]}(i)")),

@@ -12,6 +12,7 @@ All numbers are little-endian; the data of a field lies at its offset, last axis
 
 from __future__ import annotations
 
+import io
 import math
 import struct
 from collections.abc import Mapping
@@ -46,23 +47,17 @@ class Field:
 
 
 class TensorFile:
-    """The fields of a container. Nothing but the header is read before `array` asks for it, and all sizes are
+    """The fields of a container, from a file's bytes. No array is made before `array` asks for it, and all sizes are
     checked against the file's first. Raises FormatError."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self._length = path.stat().st_size
-        if self._length > LARGEST_FILE:
-            raise FormatError(f"{path}: expected at most {LARGEST_FILE} bytes, found {self._length}")
-        with path.open("rb") as stream:
-            self.fields = self._header(stream)
+    def __init__(self, path: Path, data: bytes) -> None:
+        self.path, self._data = path, data
+        self.fields = self._header(io.BytesIO(data))
 
     def array(self, name: str) -> NDArray[Any]:
         """The data of a field. Raises FormatError if there is no such field, or a number in it is not finite."""
         field = self.field(name)
-        with self.path.open("rb") as stream:
-            stream.seek(field.offset)
-            data = np.frombuffer(_take(self.path, stream, field.nbytes, name), field.dtype).reshape(field.shape)
+        data = np.frombuffer(self._data, field.dtype, math.prod(field.shape), field.offset).reshape(field.shape)
         if data.dtype.kind == "f" and not np.isfinite(data).all():
             raise FormatError(f"{self.path}: {name}: expected finite numbers, found NaN or infinity")
         return data
@@ -89,9 +84,9 @@ class TensorFile:
             fields[name] = field
         header = stream.tell()
         for name, field in fields.items():
-            if not header <= field.offset <= self._length - field.nbytes:
+            if not header <= field.offset <= len(self._data) - field.nbytes:
                 found = f"{field.nbytes} bytes from byte {field.offset}"
-                raise FormatError(f"{self.path}: {name}: expected data within {self._length} bytes, found {found}")
+                raise FormatError(f"{self.path}: {name}: expected data within {len(self._data)} bytes, found {found}")
         return fields
 
     def _field(self, stream: BinaryIO) -> tuple[str, Field]:

@@ -11,17 +11,19 @@ from numpy.typing import NDArray
 from ..errors import FormatError
 
 LARGEST_FILE = 2**28  # bytes
+MOST_LINES = 2**23
+LINE_ENDS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"  # of str.splitlines
 
 
-def text_of(path: Path) -> str:
-    """The text in a file. Raises FormatError if it is too long, or not text."""
-    length = path.stat().st_size
-    if length > LARGEST_FILE:
-        raise FormatError(f"{path}: expected at most {LARGEST_FILE} bytes, found {length}")
+def text_of(path: Path, data: bytes) -> str:
+    """The text in a file's bytes. Raises FormatError if it is not text, or has more lines than anybody measures."""
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise FormatError(f"{path}: expected text, found another byte at {error.start}") from error
+    if sum(text.count(mark) for mark in LINE_ENDS) > MOST_LINES:
+        raise FormatError(f"{path}: expected at most {MOST_LINES} lines, found more")
+    return text
 
 
 def uncommented(text: str) -> list[str]:

@@ -15,6 +15,7 @@ from ..half_diff import half_diff
 
 SHAPES = ((6, 21), (21, 21), (21, 3))
 WEIGHTS = sum((rows + 1) * columns for rows, columns in SHAPES)
+LARGEST_WEIGHT = 1e10  # three layers of them stay within single precision
 LARGEST_EXPONENT = 20.0  # of the output: f_r up to 5e8
 
 
@@ -29,8 +30,8 @@ class NeuralBrdf(Brdf):
         found = [(weights.shape, bias.shape) for weights, bias in layers]
         if found != [(shape, shape[1:]) for shape in SHAPES]:
             raise MaterialError(f"{name}: expected layers of shapes {SHAPES} with biases, found {found}")
-        if not all(np.isfinite(values).all() for layer in layers for values in layer):
-            raise MaterialError(f"{name}: expected finite weights, found others")
+        if not all((np.abs(values) <= LARGEST_WEIGHT).all() for layer in layers for values in layer):  # nor is NaN
+            raise MaterialError(f"{name}: expected finite weights of at most {LARGEST_WEIGHT:g}, found others")
         self.name = name
         self._layers = layers
 

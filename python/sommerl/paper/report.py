@@ -71,7 +71,7 @@ def paper(options: Namespace) -> dict[str, Any]:
         result[item] = rows
         if not options.json:
             _show(title, rows)
-            print(f"→ {target}\n")
+            console.say(f"→ {target}", "")
     return result
 
 

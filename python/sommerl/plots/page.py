@@ -13,6 +13,7 @@ from ..errors import MaterialError, OptionError
 from ..files import atomic_write
 from ..optional import optional
 from ..style import plain_style
+from ..visible import visible
 
 Material = tuple[str, Brdf]  #: and its name
 Materials = Brdf | Mapping[str, Brdf]  #: a material, or several by the names that a legend gives them
@@ -58,7 +59,7 @@ def named(brdf: Materials) -> list[Material]:
 
 def text(name: str) -> str:
     """A name as matplotlib shows it: a dollar is no formula, and no legend leaves it out for its first letter."""
-    short = name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1] + "…"
+    short = visible(name, LONGEST_NAME)
     return ("\u200b" if short.startswith("_") else "") + short.replace("$", r"\$")
 
 

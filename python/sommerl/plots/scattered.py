@@ -11,7 +11,7 @@ from ..arrays import split
 from ..formats.scattered import REACH, ScatteredTable
 from ..half_diff import half_diff, spherical
 from ..style import plain_style
-from .page import matplotlib, save
+from .page import matplotlib, save, text
 
 INCIDENCES = (10, 45, 75)  # degrees
 
@@ -22,8 +22,9 @@ def coverage(table: ScatteredTable, path: Path) -> None:
     with plain_style():
         figure = matplotlib().Figure(figsize=(13, 3.6), layout="constrained")
         share = f"{table.facts['coverage']:.1%} of the lattice (by solid angle and cosines)"
+        named = f"{text(table.name)}: {len(table.samples.wi)} samples"
         figure.suptitle(
-            f"{table.name}: {len(table.samples.wi)} samples; {share} within {np.degrees(REACH):.0f}° of one (yellow)",
+            f"{named}; {share} within {np.degrees(REACH):.0f}° of one (yellow)",
             fontsize=11,
         )
         _slices(figure.add_subplot(1, 4, 1), table)

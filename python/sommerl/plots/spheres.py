@@ -8,7 +8,7 @@ from pathlib import Path
 from ..optional import optional
 from ..render.compare import Comparison
 from ..style import plain_style
-from .page import save
+from .page import save, text
 
 COLUMNS = 6  # of a sheet of spheres
 
@@ -32,7 +32,7 @@ def fits(name: str, models: Sequence[str], comparisons: Sequence[Comparison], pa
             ax.axis("off")
         for number, (title, pictures) in enumerate(cells):
             line, column = divmod(number, columns)
-            axes[2 * line, column].set_title(title, fontsize=8, wrap=True)
+            axes[2 * line, column].set_title(text(title), fontsize=8, wrap=True)
             for below, pixels in enumerate(pictures):
                 axes[2 * line + below, column].imshow(pixels)
         save(figure, path)

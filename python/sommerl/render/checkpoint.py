@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from .. import container
 from ..brdf import Brdf
 from ..errors import FormatError, OptionError, SommerlError
-from ..files import atomic_write, remove_left_over, visible
+from ..files import atomic_write, remove_left_over
+from ..visible import visible
 
 MAGIC, VERSION = b"SMRP", 1
 HEAD = struct.Struct("<IIII")  # length of the identity, number of images, passes, whether there is a sum of samples

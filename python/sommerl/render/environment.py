@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import door
 from ..errors import FormatError
+from . import hdr, image_heads
 from .llvm import mitsuba
+
+LARGEST_FILE = 2**30  # bytes
 
 # Elevation [degrees], azimuth [degrees, 0 behind the camera, growing to its left], angular size σ [degrees], radiance.
 LIGHTS = (
@@ -42,23 +47,37 @@ def default_environment(height: int = 512) -> NDArray[np.float32]:
     return radiance.astype(np.float32)
 
 
-def load_environment(path: Path) -> NDArray[np.float32]:
-    """A latitude-longitude image (OpenEXR, Radiance HDR …), linear RGB, of shape (height, width, 3).
+def load_environment(path: Path, warn: Callable[[str], None] = lambda sentence: None) -> NDArray[np.float32]:
+    """A latitude-longitude image (OpenEXR, Radiance HDR, PFM), linear RGB, of shape (height, width, 3).
 
-    Raises FormatError if it cannot be read, is an image of low dynamic range (PNG, JPEG), or holds values that no light
-    has.
+    warn: is told of an image that is not twice as wide as high, which then lights the scene distorted. Raises
+    FormatError if it cannot be read, is larger than 2²⁶ pixels, is an image of low dynamic range (PNG, JPEG), or holds
+    values that no light has.
     """
-    mi = mitsuba()
-    try:
-        bitmap = mi.Bitmap(str(path))
-        kind = bitmap.component_format()
-        linear = bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False)
-    except RuntimeError as error:
-        raise FormatError(f"{path}: expected an environment image, found something unreadable") from error
-    if kind not in (mi.Struct.Type.Float16, mi.Struct.Type.Float32, mi.Struct.Type.Float64):
+    data = door.read(path, LARGEST_FILE, "an environment image")
+    kind = image_heads.kind_of(data)
+    if kind == "LDR":
         # It would light the scene all the same, with lamps no brighter than paper.
         raise FormatError(f"{path}: expected radiance in numbers that go beyond white (.exr, .hdr), found an LDR image")
-    radiance = np.array(linear)
-    if not (np.isfinite(radiance).all() and (radiance >= 0).all() and radiance.any()):
+    try:
+        image_heads.check(kind, data)
+        linear = hdr.decode(data) if kind == "RGBE" else _decoded(data, kind)
+    except FormatError:
+        raise
+    except Exception as error:  # of many kinds, as UnicodeDecodeError where its own sentence quotes the file
+        raise FormatError(f"{path}: expected an environment image, found something unreadable") from error
+    if not (np.isfinite(linear).all() and (linear >= 0).all() and linear.any()):
         raise FormatError(f"{path}: expected finite, non-negative radiance, found other values or only black")
-    return radiance
+    height, width, _ = linear.shape
+    if width != 2 * height:
+        warn(f"{path}: expected an environment twice as wide as high, found {width} × {height}: it is stretched")
+    return linear
+
+
+def _decoded(data: bytes, kind: str) -> NDArray[np.float32]:
+    """Linear RGB, by Mitsuba. Raises whatever it does."""
+    mi = mitsuba()
+    # From a file, and not from memory: Mitsuba's streams of memory have no end, and it would wait for one.
+    with door.copied(data, ".image") as copy:
+        bitmap = mi.Bitmap(str(copy), getattr(mi.Bitmap.FileFormat, kind))
+    return np.array(bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..files import atomic_write
 from ..optional import optional
 from ..style import plain_style
+from ..visible import visible
 from .llvm import mitsuba
 
 DIFFERENCE_GAIN = 8
@@ -80,13 +81,15 @@ def captioned(
     step = height + band
     rows = -(-len(pictures) // columns)
     wide = columns * width
-    lines = _lines(notes, int(1.5 * wide / text))
+    lines = _lines([visible(note) for note in notes], int(1.5 * wide / text))
     sheet = np.full((rows * step + band * len(lines), wide, 3), 255, np.uint8)
     words: list[tuple[float, float, str, int]] = []
     for number, (caption, picture) in enumerate(pictures):
         x, y = number % columns * width, number // columns * step
         sheet[y : y + height, x : x + width] = picture
-        words.append((x + width / 2, y + height + band / 2, shortened(caption, int(1.5 * width / text)), width))
+        words.append(
+            (x + width / 2, y + height + band / 2, shortened(visible(caption), int(1.5 * width / text)), width)
+        )
     for number, line in enumerate(lines):
         words.append((wide / 2, rows * step + (number + 0.5) * band, line, wide))
     return np.minimum(_lettered(sheet.shape[:2], words, text), sheet)  # letters are darker than what they stand on
@@ -142,13 +145,17 @@ def write_page(
     """One HTML file, complete in itself: captioned pictures side by side, a table of rows, and a note."""
     figures = "".join(
         f'<figure><img src="data:image/png;base64,{base64.b64encode(encode(pixels)).decode()}" '
-        f'alt="{html.escape(caption)}"><figcaption>{html.escape(caption)}</figcaption></figure>'
+        f'alt="{_html(caption)}"><figcaption>{_html(caption)}</figcaption></figure>'
         for caption, pixels in pictures
     )
-    cells = "".join(f"<tr><th>{html.escape(key)}</th><td>{html.escape(value)}</td></tr>" for key, value in rows.items())
-    page = PAGE.format(title=html.escape(title), figures=figures, cells=cells, note=html.escape(note))
+    cells = "".join(f"<tr><th>{_html(key)}</th><td>{_html(value)}</td></tr>" for key, value in rows.items())
+    page = PAGE.format(title=_html(title), figures=figures, cells=cells, note=_html(note))
     with atomic_write(path) as out:
         out.write(page.encode())
+
+
+def _html(text: str) -> str:
+    return html.escape(visible(text))
 
 
 PAGE = """<!doctype html>

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,9 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import door
 from ..errors import FormatError
 from .llvm import mitsuba
 
+LARGEST_FILE = 2**30  # bytes
 HEADER_BYTES = 2**16  # of a PLY file
 SHORTEST = 1e-3  # normal that has a direction
 Floats = NDArray[np.float64]
@@ -71,12 +75,12 @@ def load_mesh(path: Path) -> Mesh:
     Normals that are missing are computed, and a mesh that is inside out is turned. Raises FormatError for any other
     file, and for one that has no surface, no height or vertices that are not numbers.
     """
-    kind = path.suffix.lower().removeprefix(".")
-    if not path.is_file():
-        raise FormatError(f"{path}: expected a mesh, found {'a directory' if path.is_dir() else 'no file'}")
-    if kind not in ("obj", "ply"):
-        raise FormatError(f"{path}: expected a mesh in a file named .obj or .ply, found {path.suffix!r}")
-    positions, faces, normals = _read(path, kind)
+    with door.opened(path, "a mesh") as file:
+        kind = path.suffix.lower().removeprefix(".")
+        if kind not in ("obj", "ply"):
+            raise FormatError(f"{path}: expected a mesh in a file named .obj or .ply, found {path.suffix!r}")
+        data = file.read(LARGEST_FILE)
+    positions, faces, normals = _read(path, kind, data)
     if not len(faces):
         raise FormatError(f"{path}: expected triangles, found none")
     if not np.isfinite(positions).all():
@@ -101,30 +105,51 @@ def load_mesh(path: Path) -> Mesh:
     return Mesh("mesh", positions, faces, normals, found)
 
 
-def _read(path: Path, kind: str) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.float32] | None]:
+def _read(
+    path: Path, kind: str, data: bytes
+) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.float32] | None]:
     """Positions, faces, and normals if the file has them, by Mitsuba's readers."""
     mi = mitsuba()
-    given = _has_normals(path, kind)
+    if kind == "ply":
+        _check_counts(path, data)
+    given = _has_normals(data, kind)
     try:
-        # Left to itself, Mitsuba computes normals that are missing before anybody has looked at the faces.
-        mesh = mi.load_dict({"type": kind, "filename": str(path), "face_normals": not given})
-    except (RuntimeError, UnicodeDecodeError) as error:  # the latter where Mitsuba's own sentence quotes the file
+        with door.copied(data, f".{kind}") as copy:
+            # Left to itself, Mitsuba computes normals that are missing before anybody has looked at the faces.
+            mesh = mi.load_dict({"type": kind, "filename": str(copy), "face_normals": not given})
+        parameters = mi.traverse(mesh)
+        positions = np.array(parameters["vertex_positions"], np.float32).reshape(-1, 3)
+        faces = np.array(parameters["faces"], np.uint32).reshape(-1, 3)
+        normals = np.array(parameters["vertex_normals"], np.float32).reshape(-1, 3) if given else None
+    except FormatError:
+        raise
+    except Exception as error:  # of many kinds, as UnicodeDecodeError where its own sentence quotes the file
         raise FormatError(f"{path}: expected a mesh of triangles, found something unreadable") from error
-    parameters = mi.traverse(mesh)
-    positions = np.array(parameters["vertex_positions"], np.float32).reshape(-1, 3)
-    faces = np.array(parameters["faces"], np.uint32).reshape(-1, 3)
-    normals = np.array(parameters["vertex_normals"], np.float32).reshape(-1, 3) if given else None
     return positions, faces, normals if normals is None or normals.shape == positions.shape else None
 
 
-def _has_normals(path: Path, kind: str) -> bool:
+def _check_counts(path: Path, data: bytes) -> None:
+    """Raises FormatError if a PLY file says that it holds more than it can: Mitsuba would make room for all of it."""
+    if b"end_header" not in data[:HEADER_BYTES]:
+        raise FormatError(f"{path}: expected a PLY file's head within {HEADER_BYTES} bytes, found none")
+    for count in re.findall(rb"^\s*element\s+\S+\s+(\S+)", _head(data), re.MULTILINE):
+        if not (count.isdigit() and len(count) < 20 and int(count) <= len(data)):
+            found = f"{count[:20].decode('ascii', 'replace')} in {len(data)} bytes"
+            raise FormatError(f"{path}: expected a mesh with as many elements as it says, found {found}")
+
+
+def _has_normals(data: bytes, kind: str) -> bool:
     """Whether all faces name normals (OBJ), or all vertices have some (PLY). Others, Mitsuba would leave undefined."""
-    with path.open("rb") as file:
-        if kind == "obj":
-            words = (line.split(None, 2) for line in file)
-            corners = [found[1] for found in words if found[:1] == [b"f"] and len(found) > 1]
-            return bool(corners) and all(len(corner.split(b"/")) == 3 for corner in corners)
-        return b" nx\n" in file.read(HEADER_BYTES).partition(b"end_header")[0].replace(b"\r", b"")
+    if kind == "obj":
+        words = (line.split(None, 2) for line in io.BytesIO(data))
+        corners = [found[1] for found in words if found[:1] == [b"f"] and len(found) > 1]
+        return bool(corners) and all(len(corner.split(b"/")) == 3 for corner in corners)
+    return b" nx\n" in _head(data).replace(b"\r", b"")
+
+
+def _head(data: bytes) -> bytes:
+    """The lines of a PLY file before its data."""
+    return data[:HEADER_BYTES].partition(b"end_header")[0]
 
 
 def vertex_normals(positions: NDArray[np.float32], faces: NDArray[np.uint32]) -> NDArray[np.float32]:

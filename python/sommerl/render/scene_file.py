@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import html
 import re
 from collections.abc import Callable, Generator, Mapping
@@ -13,16 +14,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import door
 from ..errors import FormatError, OptionError, SommerlError
-from ..files import atomic_write, visible
+from ..files import atomic_write
 from ..interrupt import undisturbed
 from ..metrics import to_srgb8
+from ..visible import visible
 from .bsdf import register
 from .checkpoint import Checkpoint
 from .images import write_image
 from .llvm import mitsuba
 from .passes import Progress, sum_of_passes
 
+LARGEST_FILE = 2**32  # bytes of one that a scene is made of
 MOST_PIXELS = 2**24  # of a film: a pass of one sample a pixel then takes some 2.5 GB
 LOADERS_OWN = ("optimize", "parallel", "path")  # arguments of mi.load_file, which takes parameters beside them
 COLOURS = ("RGB", "RGBA", "Y", "YA", "XYZ", "XYZA")  # formats of pixels that a PNG can be made of
@@ -166,6 +170,11 @@ def _colours(bitmap: Any) -> Any:
     return bitmap if bitmap is not None and bitmap.pixel_format().name in COLOURS else None
 
 
+def digest_of(path: Path) -> str:
+    """The SHA-256 of a file that a scene is made of. Raises FormatError if it cannot be read."""
+    return hashlib.sha256(door.read(path, LARGEST_FILE)).hexdigest()
+
+
 def files_of(path: Path, parameters: Mapping[str, str]) -> dict[str, Path]:
     """The files that a scene is made of, by the names that it gives them: of itself and of all files that it includes,
     every one that an attribute names, as far as it is there.
@@ -175,7 +184,7 @@ def files_of(path: Path, parameters: Mapping[str, str]) -> dict[str, Path]:
     known, folders, found = dict(parameters), [path.parent, Path()], dict[str, Path]()
 
     def add(file: Path) -> None:
-        for element, attributes in ELEMENT.findall(file.read_bytes().decode("utf-8", "replace")):
+        for element, attributes in ELEMENT.findall(door.read(file, LARGEST_FILE).decode("utf-8", "replace")):
             values = {name: _filled(html.unescape(a or b), known) for name, a, b in ATTRIBUTE.findall(attributes)}
             if element == "default":
                 known.setdefault(values.get("name", ""), values.get("value", ""))

@@ -16,23 +16,22 @@ All numbers are little-endian.
 
 from __future__ import annotations
 
-import json
 import struct
-from collections.abc import Iterable, Sequence
-from math import isfinite
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core, container
+from .. import _core, container, door
 from ..container import BYTE, Reader
-from ..errors import FormatError, SommerlError
+from ..errors import FormatError, MaterialError, OptionError, SommerlError
 from ..files import atomic_write
 from ..lattice import INTERPOLATIONS, Lattice
 from ..nodes import NodeLattice
-from ..origin import Link, check_chain
+from ..origin import Link
+from . import notes
 from .codes import coordinates, gain_codes, gain_values, shape_codes, shape_values
 from .material import SomManBrdf
 
@@ -46,7 +45,6 @@ MOST_BINS = 2**16 - 1  # on an axis
 MOST_CELLS = 2**22  # MERL's larger kind of table has 2,916,000
 LONGEST_FILE = 2 * MOST_CELLS + 24 * 2**16 + 2**20
 LONGEST_NOTES = 2**16 - 1
-DEEPEST_NOTES = 32  # objects and lists within each other
 
 
 def looks_like(head: bytes) -> bool:
@@ -55,7 +53,19 @@ def looks_like(head: bytes) -> bool:
 
 
 def save(material: SomManBrdf, path: str | Path) -> int:
-    """Writes a material file; returns its length [bytes]."""
+    """Writes a material file (.smrl); returns its length [bytes].
+
+    Raises FormatError for what `load` would refuse, MaterialError for what is not compressed, OptionError for a name
+    with another extension.
+    """
+    if not isinstance(material, SomManBrdf):  # pyright: ignore[reportUnnecessaryIsInstance]
+        name = getattr(material, "name", "material")
+        raise MaterialError(
+            f"{name}: expected a compressed material, found {type(material).__name__}; sommerl.train makes one of it"
+        )
+    if Path(path).suffix.lower() != ".smrl":
+        raise OptionError(f"{path}: expected a name that ends in .smrl, found {Path(path).suffix!r}")
+    notes.check(material.options, material.metrics)
     data = encode(material)
     with atomic_write(Path(path)) as out:
         out.write(data)
@@ -64,41 +74,33 @@ def save(material: SomManBrdf, path: str | Path) -> int:
 
 def load(path: str | Path) -> SomManBrdf:
     """The material in a file. Raises FormatError if it is not one, or is damaged, or is of another version."""
-    return container.load(path, LONGEST_FILE, decode)
+    return parse(Path(path), door.read(path, LONGEST_FILE))
+
+
+def parse(path: Path, data: bytes) -> SomManBrdf:
+    """The same of a file's bytes."""
+    return container.named(path, data, decode)
 
 
 def encode(material: SomManBrdf) -> bytes:
     """The bytes of a material file. The same material always gives the same bytes."""
-    notes = _written(made_from=list(material.made_from), metrics=material.metrics, options=material.options)
+    noted = notes.written(made_from=list(material.made_from), metrics=material.metrics, options=material.options)
     nodes = isinstance(material.lattice, NodeLattice)
-    body = _head(NODES if nodes else CELLS, material.name, material.source_sha256, notes)
+    body = _head(NODES if nodes else CELLS, material.name, material.source_sha256, noted)
     body += _nodes(material) if nodes else _cells(material)
     return container.sealed(MAGIC, VERSION, body)
 
 
 def head_bytes(name: str, source_sha256: str, made_from: Sequence[Link]) -> int:
     """What a file of nodes holds before the stream [bytes]."""
-    head = _head(NODES, name, source_sha256, _written(made_from=list(made_from)))
+    head = _head(NODES, name, source_sha256, notes.written(made_from=list(made_from)))
     return container.PREFIX.size + len(head) + NODES_HEAD.size
 
 
-def _head(kind: int, name: str, source_sha256: str, notes: bytes) -> bytes:
-    if len(notes) > LONGEST_NOTES:
-        raise FormatError(f"{name}: expected notes of at most {LONGEST_NOTES} bytes, found {len(notes)}")
-    return BYTE.pack(kind) + container.origin(name, source_sha256) + SHORT.pack(len(notes)) + notes
-
-
-def _written(**known: Any) -> bytes:
-    """What there is to say."""
-    notes = {key: value for key, value in known.items() if value}
-    if not notes:
-        return b""
-    try:
-        text = json.dumps(notes, sort_keys=True, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
-    except (ValueError, RecursionError) as error:
-        raise FormatError(f"expected notes that JSON can hold, found others ({error})") from error
-    _notes(text)
-    return text
+def _head(kind: int, name: str, source_sha256: str, noted: bytes) -> bytes:
+    if len(noted) > LONGEST_NOTES:
+        raise FormatError(f"{name}: expected notes of at most {LONGEST_NOTES} bytes, found {len(noted)}")
+    return BYTE.pack(kind) + container.origin(name, source_sha256) + SHORT.pack(len(noted)) + noted
 
 
 def decode(data: bytes) -> SomManBrdf:
@@ -108,7 +110,7 @@ def decode(data: bytes) -> SomManBrdf:
         return _material(reader)
     except FormatError:
         raise
-    except (KeyError, TypeError, ValueError, SommerlError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError, SommerlError) as error:
         raise FormatError(f"expected a material file's header and contents, found others ({error})") from error
 
 
@@ -117,38 +119,8 @@ def _material(reader: Reader) -> SomManBrdf:
     if kind not in (CELLS, NODES):
         raise FormatError(f"expected kind 0 or 1, found {kind}")
     known: dict[str, Any] = reader.origin()
-    known |= _notes(reader.take(*reader.unpack(SHORT)))
+    known |= notes.parsed(reader.take(*reader.unpack(SHORT)))
     return _from_nodes(reader, known) if kind == NODES else _from_cells(reader, known)
-
-
-def _notes(text: bytes) -> dict[str, Any]:
-    """Options and metrics."""
-    try:
-        notes = json.loads(text.decode() or "{}", parse_int=_finite, parse_float=_finite, parse_constant=_finite)
-    except (ValueError, RecursionError):
-        notes = None
-    if isinstance(notes, dict) and _shallow(notes, DEEPEST_NOTES):
-        known = cast("dict[str, Any]", notes)
-        found = {key: known.get(key, {}) for key in ("options", "metrics")}
-        if all(isinstance(value, dict) for value in found.values()):
-            return found | {"made_from": check_chain(known["made_from"]) if "made_from" in known else ()}
-    raise FormatError(
-        f"expected notes of JSON objects, {DEEPEST_NOTES} deep at most, with finite numbers, found others"
-    )
-
-
-def _finite(text: str) -> int | float:
-    if not isfinite(float(text)):
-        raise ValueError(text)
-    return int(text) if text.lstrip("-").isdigit() else float(text)
-
-
-def _shallow(value: Any, deepest: int) -> bool:
-    """Whether no more objects and lists than that lie within each other."""
-    if not isinstance(value, dict | list):
-        return True
-    inner = cast("Iterable[Any]", value.values() if isinstance(value, dict) else value)
-    return deepest > 0 and all(_shallow(each, deepest - 1) for each in inner)
 
 
 def _cells(material: SomManBrdf) -> bytes:

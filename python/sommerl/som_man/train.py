@@ -32,13 +32,15 @@ class TrainReport:
     quantisation_error: for each epoch, the mean distance of the cells presented to their winners' weights, in units of
         the table's largest value.
     units_dropped: units that never won, and are not in the LUT.
-    cells_clamped: cells above the horizon that held a negative or non-finite value.
+    cells_clamped, energy_clamped: cells above the horizon that held a negative or non-finite value, and the share of
+        the energy that was lost with it (`BrdfTable`).
     seconds: wall-clock time.
     """
 
     quantisation_error: list[float]
     units_dropped: int
     cells_clamped: int
+    energy_clamped: float
     seconds: float
 
 
@@ -76,7 +78,9 @@ def train(
         made_from=table.made_from,
     )
     dropped = options.clusters - len(cells)
-    return material, TrainReport(errors, dropped, table.cells_clamped, time.perf_counter() - started)
+    return material, TrainReport(
+        errors, dropped, table.cells_clamped, table.energy_clamped, time.perf_counter() - started
+    )
 
 
 def _start(x: NDArray[np.float32], options: TrainOptions, name: str) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:

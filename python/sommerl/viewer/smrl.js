@@ -11,6 +11,8 @@ const ON_HORIZON = 1e-12;
 const MOST_CELLS = 2 ** 22;
 const LONGEST_FILE = 2 * MOST_CELLS + 24 * 2 ** 16 + 2 ** 20;
 const DEEPEST_NOTES = 32;
+const PLAIN =
+    "at most 64 names of at most 100 characters, each with a number, true, false, null or a text of at most 1000 characters";
 
 export async function decode(arrayBuffer) {
     const bytes = new Uint8Array(arrayBuffer);
@@ -149,8 +151,8 @@ class Reader {
     }
 }
 
-function expect(fine, what) {
-    if (!fine) throw new Error(`expected ${what}`);
+function expect(fine, what, before = "expected ") {
+    if (!fine) throw new Error(before + what);
 }
 
 /** Options and metrics. */
@@ -169,7 +171,26 @@ function readNotes(text) {
     const { options = {}, metrics = {} } = notes ?? {};
     const found = isObject(notes) && fine(notes, DEEPEST_NOTES) && isObject(options) && isObject(metrics);
     expect(found, `notes of JSON objects, ${DEEPEST_NOTES} deep at most, with finite numbers, found others`);
+    const { source_facts: facts = {}, ...own } = options;
+    expect(isObject(facts), "source_facts: expected a JSON object, found another", "");
+    plain("options", own);
+    plain("metrics", metrics);
+    plain("source_facts", facts);
     return { options, metrics };
+}
+
+/** Numbers, true, false, null and short texts, under short names. */
+function plain(group, values) {
+    const entries = Object.entries(values);
+    const isNumber = (item) => typeof item === "number" && Math.abs(item) <= 1e300;
+    const isPlain = (item) => item === null || typeof item === "boolean" || isNumber(item) || isText(item, 1000);
+    const fine = entries.length <= 64 && entries.every(([name, item]) => isText(name, 100) && isPlain(item));
+    expect(fine, `${group}: expected ${PLAIN}, found others`, "");
+}
+
+/** Whether it is a text of at most so many code points, without halves of pairs. */
+function isText(value, most) {
+    return typeof value === "string" && [...value].length <= most && !/\p{Surrogate}/u.test(value);
 }
 
 const CRCS = Uint32Array.from({ length: 256 }, (_, byte) => {
