@@ -1,0 +1,47 @@
+"""A small material of every kind that can be evaluated, sampled and rendered."""
+
+import numpy as np
+from factored_brdfs import made
+from helpers import SMALL, compact_material
+from rgl_files import fields
+from sampled import HANDED, NODES, lobe
+
+from sommerl import BrdfTable, SomManBrdf, builtin
+from sommerl.formats.rgl import RglBrdf
+from sommerl.models.multi_lobe import FAMILIES, MultiLobe
+from sommerl.models.nbrdf import WEIGHTS, NeuralBrdf
+from sommerl.nodes import FittedTable
+
+RNG = np.random.default_rng(1)
+VALUES = 0.3 * RNG.random((*SMALL.shape, 3)) ** 4
+
+
+def cells(interpolation):
+    index = RNG.integers(0, 40, SMALL.shape).astype(np.uint8)
+    return SomManBrdf(0.3 * RNG.random((40, 3)), index, SMALL, name="cells", interpolation=interpolation)
+
+
+def rgl():
+    a = fields()
+    return RglBrdf(a["theta_i"], a["vndf"][0], 0.3 * a["rgb"][0], a["ndf"], a["sigma"], name="rgl")
+
+
+def one_lobe(name):
+    family = FAMILIES[name]
+    return MultiLobe(name, [lobe(name, (0.3, 0.2, 0.1), **{p.name: p.start for p in family.parameters})])
+
+
+KINDS = {
+    "table-nearest": BrdfTable(VALUES, SMALL, interpolation="nearest", name="table"),
+    "table-trilinear": BrdfTable(VALUES, SMALL, name="table"),
+    "table-handed": BrdfTable(0.3 * RNG.random((*HANDED.shape, 3)), HANDED, name="handed"),
+    "cells-nearest": cells("nearest"),
+    "cells-trilinear": cells("trilinear"),
+    "nodes": compact_material(NODES),
+    "fitted": FittedTable(NODES, RNG.random((NODES.size, 3)), 0.02, name="fitted"),
+    "rgl": rgl(),
+    "neural": NeuralBrdf.from_flat(0.3 * RNG.standard_normal(WEIGHTS), name="neural"),
+    "sgd": builtin("red-fabric"),
+    "factored": made(),
+    **{name: one_lobe(name) for name in FAMILIES},
+}
