@@ -22,8 +22,9 @@ HEAD = """\
      In the scene, a file in this folder: <include filename={include}/>, and <ref id={id}/> in each shape. -->
 """
 COMMENT = (
-    "Written by Sommerl. The material's file is named relative to this one. In Python: from sommerl.render.llvm import mitsuba; from "
-    "sommerl.render.bsdf import register, snippet; mi = mitsuba(); register(); bsdf = mi.load_dict(snippet({path}))"
+    "Written by Sommerl. The material's file is named relative to this one. In Python: "
+    "from sommerl.render.llvm import mitsuba; from sommerl.render.bsdf "
+    "import register, snippet; mi = mitsuba(); register(); bsdf = mi.load_dict(snippet({path}))"
 )
 CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")  # which no XML file may have
 LONGEST = 2**16  # bytes of a .json
