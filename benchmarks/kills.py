@@ -32,7 +32,7 @@ SIGNALS = signal.SIGTERM, signal.SIGINT, signal.SIGKILL
 LONGEST = 900  # seconds that a command may take
 CHECKPOINT = ".sommerl-part"
 SMALL = ["--size", "32", "--spp", "64"]
-# Of each command its arguments, within a folder that has samples.csv and nickel.smrl.
+# Of each command its arguments, within a folder that has INPUTS.
 COMMANDS: dict[str, list[str]] = {
     "compress": ["compress", "nickel", "-o", "x.smrl", "--clusters", "64", "--epochs", "3"],
     "compress-several": ["compress", "nickel", "chrome", "-o", ".", "--clusters", "16", "--epochs", "1", "--overwrite"],
@@ -46,11 +46,25 @@ COMMANDS: dict[str, list[str]] = {
     "factor": ["factor", "nickel", "-o", "x.fbrdf", "--lobes", "1", "--terms", "2"],
     "render": ["render", "nickel.smrl", "--against", "nickel", "-o", "x.png", *SMALL],
     "render-exr": ["render", "--scene", "statue", "nickel.smrl", "--against", "nickel", "-o", "x.exr", *SMALL],
+    "render-scene": ["render", "scene.xml", "-o", "x.exr", "--spp", "64"],
     "plot": ["plot", "nickel", "nickel.smrl", "-o", "x.pdf"],
     "demo": ["demo", "--out", "."],
     "paper": ["paper", "table1", "-o", ".", "--samples", "500"],
 }
-INPUTS = "samples.csv", "nickel.smrl"
+INPUTS = "samples.csv", "nickel.smrl", "scene.xml"
+SCENE = """<scene version="3.0.0">
+    <integrator type="path"/>
+    <sensor type="perspective">
+        <transform name="to_world"><lookat origin="0, 0, 5" target="0, 0, 0" up="0, 1, 0"/></transform>
+        <film type="hdrfilm">
+            <integer name="width" value="32"/><integer name="height" value="32"/>
+            <rfilter type="box"/>  <!-- with others, sums depend on the order of threads -->
+        </film>
+    </sensor>
+    <emitter type="constant"/>
+    <shape type="sphere"><bsdf type="sommerl"><string name="filename" value="nickel.smrl"/></bsdf></shape>
+</scene>
+"""
 RUN = "from sommerl.__main__ import main; import sys; sys.exit(main())"
 # Renders write their checkpoint after each of many passes, so that kills find some.
 EAGER = "from sommerl.render import checkpoint, passes; checkpoint.SECONDS = 0.0; passes.SAMPLES_A_PASS = 2**14; "
@@ -118,6 +132,7 @@ def _prepare(folder: Path) -> None:
     from sommerl import TrainOptions, builtin, load_table, save, train
 
     folder.mkdir()
+    (folder / "scene.xml").write_text(SCENE)
     save(train(load_table("nickel"), TrainOptions(clusters=16, epochs=1))[0], folder / "nickel.smrl")
     import numpy as np
 

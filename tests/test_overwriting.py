@@ -28,6 +28,7 @@ COMMANDS = {
         ["render", "nickel", "--against", "chrome", "-o", "{}/x.exr", *SMALL],
         ["x.exr", "x.reference.exr", "x.difference.exr"],
     ),
+    "render a scene": (["render", "{}/in/scene.xml", "-o", "{}/x.exr"], ["x.exr"]),
     "plot": (["plot", "nickel", "-o", "{}/x.pdf"], ["x.pdf"]),
     "paper": (["paper", "-o", "{}"], ["table1.csv", "fig5.csv", "fig5.png", "fig6.csv", "fig6.png"]),
 }

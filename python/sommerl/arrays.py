@@ -37,8 +37,10 @@ class NumpyOps:
 
     @staticmethod
     def gather(buffer: Any, index: Array) -> Array:
-        """Entry `index` of a flat buffer; an integer entry as one that can be calculated with, and does not wrap."""
-        value = buffer[index]
+        """Entry `index` of a flat buffer, the first or last for what is beyond; an integer entry as one that can be
+        calculated with, and does not wrap.
+        """
+        value = buffer.take(index, mode="clip")
         return value.astype(np.int64) if value.dtype.kind == "u" else value
 
     @staticmethod

@@ -20,6 +20,7 @@ from .arrays import Triple, split
 from .lattice import MERL, Interpolation, Lattice, checked
 
 Buffers = Mapping[str, Any]
+LARGEST = float(np.finfo(np.float32).max)  # renderers calculate in single precision
 AT_ONCE = 2**16  # pairs that a formula is evaluated for: bounds memory, and stays in the cache
 
 
@@ -63,17 +64,22 @@ class Brdf(ABC):
     def eval(self, wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float64]:
         """f_r [1/sr], linear RGB, shape (..., 3), for unit directions `wi` and `wo` of shape (..., 3).
 
-        Shapes broadcast. Zero where either direction is not above the horizon. Raises ValueError for other
-        shapes.
+        Shapes broadcast. NaN where a component of either is NaN or infinite; else 0 where either is not above the
+        horizon, z > 0; else a finite number. Nothing is normalised: what vectors of other lengths give means nothing,
+        but it is finite. Raises ValueError for other shapes, and for what are not real numbers.
         """
-        light, viewer = _broadcast(wi, wo)
-        above = (light[..., 2] > 0) & (viewer[..., 2] > 0)
+        light, viewer = vectors("eval", wi, wo)
+        known, above = told(light, viewer)
         result = np.zeros(light.shape)
+        result[~known] = np.nan
         pairs, buffers = (light[above], viewer[above]), self.buffers()
         parts = [slice(start, start + AT_ONCE) for start in range(0, len(pairs[0]), AT_ONCE)]
-        values = [np.stack(self.f_r(split(pairs[0][part]), split(pairs[1][part]), buffers), axis=-1) for part in parts]
+        with np.errstate(all="ignore"):
+            values = [
+                np.stack(self.f_r(split(pairs[0][part]), split(pairs[1][part]), buffers), axis=-1) for part in parts
+            ]
         if values:
-            result[above] = np.concatenate(values)
+            result[above] = finite(np.concatenate(values))
         return result
 
     def eval_both_orders(self, wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float64]:
@@ -93,7 +99,7 @@ class OnLattice(Brdf):
         return self.grid is None or self.grid.reciprocal
 
     def eval(self, wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float64]:
-        light, viewer = _broadcast(wi, wo)
+        light, viewer = vectors("eval", wi, wo)
         pairs = (np.ascontiguousarray(w).reshape(-1, 3) for w in (light, viewer))
         return self._found(*pairs).reshape(light.shape)
 
@@ -130,9 +136,41 @@ class OnLattice(Brdf):
         self.interpolation = checked(interpolation)
 
 
-def _broadcast(wi: ArrayLike, wo: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    light, viewer = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
-    if light.shape[-1:] != (3,) or viewer.shape[-1:] != (3,):
-        raise ValueError(f"eval: expected directions of shape (..., 3), found {light.shape} and {viewer.shape}")
-    light, viewer = np.broadcast_arrays(light, viewer)
-    return light, viewer
+def vectors(caller: str, *given: ArrayLike) -> list[NDArray[np.float64]]:
+    """Arrays of shape (..., 3), broadcast to one shape. Raises ValueError, which names the caller, for other shapes,
+    and for what are not real numbers.
+    """
+    arrays = [_real(caller, each) for each in given]
+    shapes = [array.shape for array in arrays]
+    found = " and ".join(map(str, shapes))
+    if any(shape[-1:] != (3,) for shape in shapes):
+        raise ValueError(f"{caller}: expected directions of shape (..., 3), found {found}")
+    try:
+        return list(np.broadcast_arrays(*arrays)) if len(set(shapes)) > 1 else arrays
+    except ValueError as error:
+        raise ValueError(f"{caller}: expected shapes that broadcast, found {found}") from error
+
+
+def _real(caller: str, given: ArrayLike) -> NDArray[np.float64]:
+    try:
+        array = np.asarray(given)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{caller}: expected an array of real numbers, found {type(given).__name__}") from error
+    if array.dtype.kind not in "biuf":
+        raise ValueError(f"{caller}: expected real numbers, found {array.dtype}")
+    if array.dtype == np.float64:
+        return array
+    with np.errstate(over="ignore"):  # of what has more digits
+        return array.astype(np.float64)
+
+
+def told(wi: NDArray[np.float64], wo: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Of pairs of vectors (..., 3): whether all components are finite; and whether, besides, both have z > 0."""
+    known = np.asarray((np.isfinite(wi) & np.isfinite(wo)).all(axis=-1))
+    return known, known & (wi[..., 2] > 0) & (wo[..., 2] > 0)
+
+
+def finite(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same, with 0 for what is no number, and LARGEST for infinity: with vectors that are long, or next to the
+    horizon, formulas overflow."""
+    return values if np.isfinite(values).all() else np.nan_to_num(values, nan=0.0, posinf=LARGEST, neginf=-LARGEST)

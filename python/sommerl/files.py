@@ -147,7 +147,7 @@ def _target(path: Path) -> Path | None:
     if found.st_size and not _replacing.get():
         if any(name.suffix.lower() in MEASURED for name in (path, target)):
             raise OptionError(
-                f"{path}: expected a new name, found a file, of a measured format; --overwrite replaces it"
+                f"{path}: expected a new name, found a file of a measured format; --overwrite replaces it"
             )
         if not _ours(path):
             raise OptionError(

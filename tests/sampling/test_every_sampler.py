@@ -236,5 +236,5 @@ def test_shapes(name):
 def test_other_shapes_are_refused(name, shapes):
     found, (one, other) = sampler(name, "glossy"), (np.ones(shape) for shape in shapes)
     for call in (found.sample, found.pdf):
-        with pytest.raises(ValueError, match=r"expected arrays of shape \(\.\.\., 3\), found|broadcast"):
+        with pytest.raises(ValueError, match=r"expected directions of shape \(\.\.\., 3\), found|broadcast"):
             call(one, other)

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, Triple, split
-from ..brdf import Brdf, Buffers
+from ..brdf import Brdf, Buffers, finite, told, vectors
 
 PI = np.pi
+UP = np.array([0.0, 0.0, 1.0])  # in the place of directions that are none
 
 
 class Sampler(ABC):
@@ -57,27 +58,35 @@ class Sampler(ABC):
         """Directions to the light for directions to the viewer `wo` and random numbers `u`, both of shape (..., 3).
 
         Returns wi (..., 3), their densities [1/sr] (...), and their weights f_r cos θ_i / pdf (..., 3), whose mean is
-        the albedo. Density and weight are 0 where nothing was drawn. Raises ValueError for other shapes.
+        the albedo. Density and weight are 0 where nothing was drawn. All three are NaN where `wo` or `u` is not finite.
+        Raises ValueError for other shapes, for what are not real numbers, and for `u` outside of [0, 1].
         """
-        viewer, numbers = _triples(wo, u)
-        wi, pdf = self.draw(split(viewer), split(numbers), self.buffers())
-        light = np.stack(wi, axis=-1)
-        drawn = pdf > 0
-        light = np.where(drawn[..., None], light, [0.0, 0.0, 1.0])
-        share = np.where(drawn, light[..., 2] / np.where(drawn, pdf, 1.0), 0.0)
-        return light, pdf, self.brdf.eval(light, viewer) * share[..., None]
+        viewer, numbers = vectors("sample", wo, u)
+        if ((numbers < 0) | (numbers > 1)).any():
+            raise ValueError("sample: expected random numbers from 0 to 1, found others")
+        known = np.asarray(np.isfinite(viewer + numbers).all(axis=-1))
+        above = known & (viewer[..., 2] > 0)
+        viewer = np.where(above[..., None], viewer, UP)
+        numbers = np.where(known[..., None], numbers, 0.5)
+        with np.errstate(all="ignore"):
+            wi, density = self.draw(split(viewer), split(numbers), self.buffers())
+            drawn = above & (density > 0)
+            light = np.where(drawn[..., None], np.stack(wi, axis=-1), UP)
+            pdf = finite(np.where(drawn, density, 0.0))
+            share = np.where(drawn, light[..., 2] / np.where(drawn, pdf, 1.0), 0.0)
+            weight = finite(self.brdf.eval(light, viewer) * share[..., None])
+        light, weight = (np.where(known[..., None], each, np.nan) for each in (light, weight))
+        return light, np.where(known, pdf, np.nan), weight
 
     def pdf(self, wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float64]:
         """The density [1/sr] of drawing `wi` for `wo`, unit directions of shape (..., 3), which broadcast.
 
-        0 where either is not above the horizon. Raises ValueError for other shapes.
+        As in `Brdf.eval`, NaN where a component of either is not finite, else 0 where either is not above the horizon.
+        Raises ValueError for other shapes, and for what are not real numbers.
         """
-        light, viewer = _triples(wi, wo)
-        return np.asarray(self.density(split(light), split(viewer), self.buffers()))
-
-
-def _triples(*arrays: ArrayLike) -> list[NDArray[np.float64]]:
-    given = [np.asarray(array, np.float64) for array in arrays]
-    if any(array.shape[-1:] != (3,) for array in given):
-        raise ValueError(f"expected arrays of shape (..., 3), found {' and '.join(str(a.shape) for a in given)}")
-    return np.broadcast_arrays(*given)  # pyright: ignore[reportReturnType]
+        light, viewer = vectors("pdf", wi, wo)
+        known, above = told(light, viewer)
+        light, viewer = (np.where(above[..., None], w, UP) for w in (light, viewer))
+        with np.errstate(all="ignore"):
+            density = finite(np.asarray(self.density(split(light), split(viewer), self.buffers())))
+        return np.where(known, np.where(above & (density > 0), density, 0.0), np.nan)
