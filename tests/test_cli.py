@@ -163,7 +163,11 @@ def test_render_with_a_sampler(capsys, folder, tmp_path, sampler):
 def test_render_in_an_environment_from_a_file(capsys, folder, tmp_path):
     run_json(capsys, "render", folder / "pearl.smrl", "-o", tmp_path / "probe.exr", *SMALL_PICTURE)
     options = "-o", tmp_path / "out.png", "--envmap", tmp_path / "probe.exr"
-    run_json(capsys, "render", folder / "pearl.binary", *options, *SMALL_PICTURE, "--lookup", "nearest")
+    found = run(capsys, "render", folder / "pearl.binary", *options, *SMALL_PICTURE, "--lookup", "nearest")
+    assert found[0] == 0
+    assert found[2].startswith(
+        f"warning: {tmp_path / 'probe.exr'}: expected an environment twice as wide as high, found 24 × 24"
+    )
 
 
 def test_demo(capsys, tmp_path, monkeypatch):

@@ -7,12 +7,13 @@ import io
 import json
 import math
 import sys
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, NoReturn, get_args
 
-from . import __version__, commands, convert, demo, own_scenes, plots, rendering, threads
+from . import __version__, commands, console, convert, demo, own_scenes, plots, rendering, threads
 from .factored.fit import FactorOptions
 from .files import keeping
 from .fitting.options import MOST_LOBES, FitOptions, Loss, Sampling
@@ -77,7 +78,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.threads is not None:
             threads.use(threads.checked(options.threads, threads.OPTION))
         threads.limit()
-        with keeping(overwrite=getattr(options, "overwrite", False)):
+        with warnings.catch_warnings(), keeping(overwrite=getattr(options, "overwrite", False)):
+            warnings.showwarning = lambda message, *_, **__: console.tell(f"warning: {message}")
             result = options.run(options)
         if options.json:
             print(json.dumps(_finite(result), indent=2))
