@@ -79,12 +79,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
             threads.use(threads.checked(options.threads, threads.OPTION))
         threads.limit()
         with warnings.catch_warnings(), keeping(overwrite=getattr(options, "overwrite", False)):
-            warnings.showwarning = lambda message, *_, **__: console.tell(f"warning: {message}")
+            warnings.showwarning = _warned
             result = options.run(options)
         if options.json:
             print(json.dumps(_finite(result), indent=2))
 
     return outcome(command)
+
+
+def _warned(message: Warning | str, *_: Any, **__: Any) -> None:
+    """Tells a warning of Python's without the line of code that it comes from."""
+    console.tell(f"warning: {message}")
 
 
 def _finite(value: Any) -> Any:
