@@ -65,7 +65,7 @@ def test_both_snippets_name_the_same_place(folder):
         assert "lambertian" in str(mitsuba().load_dict(snippet(folder / where / "grey.json")))
 
 
-NAMES = ["a b", "q\"u'o", "am&p", "da--sh", "ä日", "do.t", "co:lon", "<x>", "tab\tnl\n", "back\\slash", "-x", "nickel"]
+NAMES = ["a b", "q\"u'o", "am&p", "da--sh", "ä日", "do.t", "co:lon", "<x>", "back\\slash", "-x", "nickel"]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -124,14 +124,15 @@ def test_a_member_of_an_archive(tmp_path, monkeypatch):
     mi.load_file(str(tmp_path / "sub" / "x--y.xml"))
 
 
-@pytest.mark.parametrize("name", ["pri$ce", "a\x01b"])
+@pytest.mark.parametrize("name", ["pri$ce", "a\x01b", "a\x1b[2J", "a\nb", "a\u202eb"])
 def test_what_xml_cannot_hold(tmp_path, name):
     for material, path in ((tmp_path / f"{name}.smrl", tmp_path / "x.xml"), ("nickel", tmp_path / f"{name}.xml")):
         (tmp_path / f"{name}.smrl").write_bytes(b"")
-        with pytest.raises(FormatError, match=r"without \$ and control characters"):
+        with pytest.raises(FormatError, match=r"without \$, of characters that can be printed"):
             scene.write(material, path)
         assert not path.exists()
         scene.write(material, path.with_suffix(".json"))
+        assert path.with_suffix(".json").read_text().isascii()
 
 
 def test_names_that_are_no_text(tmp_path):
@@ -140,15 +141,6 @@ def test_names_that_are_no_text(tmp_path):
     for extension in ("xml", "json"):
         with pytest.raises(FormatError, match=r"expected names in UTF-8, found .\.smrl"):
             scene.write(tmp_path / name, tmp_path / f"x.{extension}")
-
-
-@pytest.mark.parametrize("name", ["a\x1b[2J", "a\nb", "a\u202eb", "a\udcff"])
-def test_names_that_xml_cannot_hold_or_nobody_can_see(tmp_path, name):
-    (tmp_path / f"{name}.smrl").write_bytes(b"")
-    with pytest.raises(FormatError, match="expected names of characters that can be printed"):
-        scene.write(tmp_path / f"{name}.smrl", tmp_path / "x.xml")
-    scene.write(tmp_path / f"{name}.smrl", tmp_path / "x.json")
-    assert json.loads((tmp_path / "x.json").read_text())["filename"] == str(tmp_path / f"{name}.smrl")
 
 
 def test_a_built_in_is_named(tmp_path):

@@ -43,6 +43,7 @@ def write(material: str | Path, path: str | Path) -> None:
         # Where the folders really are: from behind a link, ".." leads elsewhere.
         place = os.path.relpath(Path(os.path.realpath(file.parent)) / file.name, os.path.realpath(path.parent))
         name = Path(place).as_posix() + (f":{member}" if member else "")
+    _check_utf8(path, name)
     for text in (name, path.name) if xml else ():
         if "$" in text or visible(text) != text:
             raise FormatError(
@@ -50,12 +51,16 @@ def write(material: str | Path, path: str | Path) -> None:
                 f"takes, found {text}; .json takes others"
             )
     text = _xml(name, path) if xml else _json(name, path)
+    with atomic_write(path) as out:
+        out.write(text.encode())
+
+
+def _check_utf8(path: Path, name: str) -> None:
+    """Raises FormatError for a name that is no text, which Mitsuba could not be given."""
     try:
-        data = text.encode()
+        name.encode()
     except UnicodeEncodeError as error:
         raise FormatError(f"{path}: expected names in UTF-8, found {name}") from error
-    with atomic_write(path) as out:
-        out.write(data)
 
 
 def _xml(name: str, path: Path) -> str:
@@ -71,7 +76,7 @@ def _xml(name: str, path: Path) -> str:
 def _json(name: str, path: Path) -> str:
     comment = COMMENT.format(path=repr(path.name))
     found = {"comment": comment, "type": "sommerl", "filename": name}
-    return json.dumps(found, indent=2, ensure_ascii=False) + "\n"
+    return json.dumps(found, indent=2) + "\n"
 
 
 def read(path: str | Path) -> dict[str, Any]:
