@@ -139,7 +139,19 @@ def noted(notes, made):
     return sealed(body[:at] + struct.pack("<H", len(notes)) + notes + body[at + 2 :])
 
 
+FIRST = b'{"kind":"som-man","name":"x"}'
+LINK = b'{"kind":"source","name":"x","sha256":"' + b"0f" * 32 + b'"}'
+CHAINS = [
+    *(b"[]", b"3", b"null", b"{}", b"[" + FIRST + b"]", b"[" + LINK + b"]", b"[[]]", b"[null]"),
+    *(b"[" + FIRST + n * (b"," + LINK) + b"]" for n in (1, 7, 8)),
+    *(b"[" + FIRST.replace(b"x", name) + b"]" for name in (b"x" * 255, b"x" * 256, "\U0001f600".encode() * 255)),
+    *(b"[" + FIRST.replace(b"som-man", kind) + b"]" for kind in (b"factored", b"other", b"")),
+    *(b"[" + FIRST + b"," + LINK.replace(b"0f", digits) + b"]" for digits in (b"0F", b"", b"0", b"0g", b"0f\\n")),
+    b"[" + FIRST.replace(b'"x"', b"3") + b"]",
+    b"[" + FIRST.replace(b"}", b',"more":"x"}') + b"]",
+]
 NOTES = [
+    *(b'{"made_from":' + chain + b"}" for chain in CHAINS),
     *(
         b"{}",
         b"[]",

@@ -11,6 +11,7 @@ const ON_HORIZON = 1e-12;
 const MOST_CELLS = 2 ** 22;
 const LONGEST_FILE = 2 * MOST_CELLS + 24 * 2 ** 16 + 2 ** 20;
 const DEEPEST_NOTES = 32;
+const KINDS = ["som-man", "factored", "source"]; // of what a material was made from
 const PLAIN =
     "at most 64 names of at most 100 characters, each with a number, true, false, null or a text of at most 1000 characters";
 
@@ -176,7 +177,19 @@ function readNotes(text) {
     plain("options", own);
     plain("metrics", metrics);
     plain("source_facts", facts);
+    const { made_from: chain } = notes;
+    const some = Array.isArray(chain) && chain.length >= 1 && chain.length <= 8;
+    expect(chain === undefined || (some && chain.every(isLink)), "made_from: expected a list of 1 to 8 sources, found something else", "");
     return { options, metrics };
+}
+
+/** One of what a material was made from; the first one's SHA-256 is in the head. */
+function isLink(link, at) {
+    if (link === null || typeof link !== "object" || Array.isArray(link)) return false;
+    const known = Object.keys(link).sort().join() === (at ? "kind,name,sha256" : "kind,name");
+    if (!known || !Object.values(link).every((value) => typeof value === "string")) return false;
+    const { kind, name, sha256 = "" } = link;
+    return KINDS.includes(kind) && [...name].length <= 255 && /^([0-9a-f]{64})?$/.test(sha256);
 }
 
 /** Numbers, true, false, null and short texts, under short names. */
