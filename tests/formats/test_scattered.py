@@ -191,9 +191,7 @@ def test_what_goes_below_zero_is_counted():
 def test_what_is_too_large_for_single_precision_is_refused(value):
     f_r = np.full((len(A), 3), 0.3)
     f_r[7, 2] = value
-    with pytest.raises(
-        FormatError, match="expected values that single precision can hold in every sample"
-    ):
+    with pytest.raises(FormatError, match="expected values that single precision can hold in every sample"):
         to_table(Samples(A, B, f_r), name="x")
 
 

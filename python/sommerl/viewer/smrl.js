@@ -9,6 +9,7 @@ import { readNodes } from "./nodes.js";
 
 const ON_HORIZON = 1e-12;
 const MOST_CELLS = 2 ** 22;
+const LARGEST = (2 - 2 ** -23) * 2 ** 127; // of single precision
 
 export async function decode(arrayBuffer) {
     const bytes = new Uint8Array(arrayBuffer);
@@ -53,7 +54,7 @@ async function cells(reader) {
     const payload = await inflated(reader.rest(), 24 * clusters + width * above.length);
     const view = new DataView(payload.buffer);
     const lut = Float64Array.from({ length: 3 * clusters }, (_, i) => view.getFloat64(8 * i, true));
-    expect(lut.every((x) => x >= 0 && x < Infinity), "LUT entries that are finite and not negative, found others");
+    expect(lut.every((x) => x >= 0 && x <= LARGEST), "LUT entries from 0 to the largest of single precision, found others");
     const index = width === 1 ? new Uint8Array(size) : new Uint16Array(size);
     above.forEach((cell, i) => {
         const at = 24 * clusters + width * i;
