@@ -49,7 +49,7 @@ COMMANDS: dict[str, list[str]] = {
     "render-scene": ["render", "scene.xml", "-o", "x.exr", "--spp", "64"],
     "plot": ["plot", "nickel", "nickel.smrl", "-o", "x.pdf"],
     "demo": ["demo", "--out", "."],
-    "paper": ["paper", "table1", "-o", ".", "--samples", "500"],
+    "paper": ["paper", "table1", "-o", ".", "--samples", "1000"],
 }
 INPUTS = "samples.csv", "nickel.smrl", "scene.xml"
 SCENE = """<scene version="3.0.0">

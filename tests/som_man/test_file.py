@@ -277,7 +277,7 @@ def test_an_entry_outside_the_lut_or_no_reflectance_is_refused():
     head, payload = cell_parts(made("cells"))
     with pytest.raises(FormatError, match="indices below 3"):
         decode(plain(head, deflated(payload[:-1] + b"\x03")))
-    for bad in (np.nan, np.inf, -1.0):
+    for bad in (np.nan, np.inf, -1.0, 3.5e38):
         with pytest.raises(FormatError, match="LUT entries"):
             decode(plain(head, deflated(struct.pack("<d", bad) + payload[8:])))
 

@@ -228,6 +228,17 @@ def test_no_file_is_longer(node, tmp_path):
     assert node([bytes(length)]) == [f"expected at most {length - 1} bytes, found {length}"]
 
 
+def test_it_takes_the_numbers_that_python_takes(node):
+    largest, contents = float(np.finfo(np.float32).max), []
+    for value in (largest, np.nextafter(largest, np.inf), 5e-324, 1e308):
+        made = cells(3, Lattice(2, 2, 3))
+        made.lut[1, 1] = value
+        contents.append(encode(made))
+    wanted = list(map(read, contents))
+    check_same(node(contents), wanted)
+    assert [isinstance(each, str) for each in wanted] == [False, True, False, True]
+
+
 def test_it_takes_the_notes_that_python_takes(node):
     contents = [with_notes(noted) for noted in (*NOT_PLAIN, *FINE, b'{"options":{"a":1e999}}', b"[" * 30_000)]
     found, wanted = node(contents), list(map(read, contents))

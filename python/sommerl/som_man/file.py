@@ -33,7 +33,7 @@ from ..nodes import NodeLattice
 from ..origin import Link
 from . import notes
 from .codes import coordinates, gain_codes, gain_values, shape_codes, shape_values
-from .material import SomManBrdf
+from .material import LARGEST, SomManBrdf
 
 MAGIC = b"SMRL"
 VERSION = 1
@@ -149,8 +149,8 @@ def _from_cells(reader: Reader, known: dict[str, Any]) -> SomManBrdf:
     payload = container.inflated(reader.rest(), 24 * clusters + entry.itemsize * int(above.sum()))
     lut = np.frombuffer(payload, "<f8", 3 * clusters).reshape(clusters, 3)
     entries = np.frombuffer(payload, entry, offset=24 * clusters)
-    if not (np.isfinite(lut) & (lut >= 0)).all():
-        raise FormatError("expected LUT entries that are finite and not negative, found others")
+    if not ((lut >= 0) & (lut <= LARGEST)).all():
+        raise FormatError("expected LUT entries from 0 to the largest of single precision, found others")
     if entries.max() >= clusters:
         raise FormatError(f"expected indices below {clusters}, found {entries.max()}")
     index: NDArray[Any] = np.zeros(lattice.shape, entry)

@@ -15,6 +15,8 @@ from ..errors import MaterialError
 from ..lattice import Interpolation, Lattice, checked
 from ..nodes import NodeLattice, from_cube_root
 
+LARGEST = float(np.finfo(np.float32).max)  # renderers calculate in single precision
+
 
 class SomManBrdf(OnLattice):
     """A material compressed by the paper's method: a lookup finds entries of a palette and blends them.
@@ -77,8 +79,8 @@ class SomManBrdf(OnLattice):
             self._interpolate(interpolation)
 
     def _cells(self, index: NDArray[Any], lattice: Lattice) -> NDArray[Any]:
-        if not (self.lut >= 0).all():
-            raise MaterialError(f"{self.name}: expected finite, non-negative LUT entries, found others")
+        if not ((self.lut >= 0) & (self.lut <= LARGEST)).all():
+            raise MaterialError(f"{self.name}: expected LUT entries from 0 to {LARGEST:.4g}, found others")
         if index.shape != lattice.shape or index.dtype.kind != "u":
             found = f"{index.dtype} of shape {index.shape}"
             raise MaterialError(f"{self.name}: expected an unsigned index of shape {lattice.shape}, found {found}")

@@ -14,6 +14,7 @@ const DEEPEST_NOTES = 32;
 const KINDS = ["som-man", "factored", "source"]; // of what a material was made from
 const PLAIN =
     "at most 64 names of at most 100 characters, each with a number, true, false, null or a text of at most 1000 characters";
+const LARGEST = (2 - 2 ** -23) * 2 ** 127; // of single precision
 
 export async function decode(arrayBuffer) {
     const bytes = new Uint8Array(arrayBuffer);
@@ -64,7 +65,7 @@ async function cells(reader) {
     const payload = await inflated(reader.rest(), 24 * clusters + width * above.length);
     const view = new DataView(payload.buffer);
     const lut = Float64Array.from({ length: 3 * clusters }, (_, i) => view.getFloat64(8 * i, true));
-    expect(lut.every((x) => x >= 0 && x < Infinity), "LUT entries that are finite and not negative, found others");
+    expect(lut.every((x) => x >= 0 && x <= LARGEST), "LUT entries from 0 to the largest of single precision, found others");
     const index = width === 1 ? new Uint8Array(size) : new Uint16Array(size);
     let largest = 0;
     above.forEach((cell, i) => {
