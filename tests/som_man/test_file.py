@@ -17,7 +17,7 @@ from sommerl import Lattice, SomManBrdf, SommerlError, TrainOptions, load, save,
 from sommerl.container import PREFIX
 from sommerl.errors import FormatError, MaterialError, OptionError
 from sommerl.nodes import NodeLattice
-from sommerl.som_man.file import CELLS_HEAD, LONGEST_NOTES, NODES_HEAD, decode, encode
+from sommerl.som_man.file import CELLS_HEAD, NODES_HEAD, decode, encode
 
 KINDS = ("cells", "nodes")
 GOLDEN = Path(__file__).parents[1] / "golden"
@@ -329,7 +329,8 @@ def test_what_a_file_cannot_hold(material):
     material.metrics = {"rmse": np.nan}
     with pytest.raises(FormatError, match="JSON"):
         encode(material)
-    material.metrics = {"rmse": "x" * LONGEST_NOTES}
+    material.metrics = {str(number): "x" * 1000 for number in range(64)}
+    material.options = {str(number): "x" * 100 for number in range(64)}
     with pytest.raises(FormatError, match="notes of at most"):
         encode(material)
     material.metrics, material.name = {}, "ä" * 200
