@@ -48,7 +48,7 @@ def test_what_would_be_refused_is_not_written(tmp_path):
     save(made, tmp_path / "x.smrl")
     assert load(tmp_path / "x.smrl").facts == {"asymmetry": 0.5}
     made.options = {"a": [1]}
-    with pytest.raises(FormatError, match="options: expected at most 64 names of .*, each with a number"):
+    with pytest.raises(FormatError, match=r"options: expected at most 64 names of .*, each with a number"):
         save(made, tmp_path / "y.smrl")
     assert not (tmp_path / "y.smrl").exists()
 
