@@ -109,7 +109,8 @@ def check_writable(path: Path) -> None:
             raise PermissionError(errno.EACCES, "cannot be written (Permission denied)", str(path))
         return
     if not target.parent.is_dir():
-        raise FileNotFoundError(errno.ENOENT, f"cannot be written: there is no folder {target.parent}", str(path))
+        folder = target.parent if path.is_symlink() else path.parent  # as typed
+        raise FileNotFoundError(errno.ENOENT, f"cannot be written: there is no folder {folder}", str(path))
     remove_left_over(target)
     with _named(target), tempfile.TemporaryFile(dir=target.parent):
         pass
