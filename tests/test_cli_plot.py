@@ -88,7 +88,7 @@ def test_bad_files(capsys, tmp_path, name):
 def test_a_picture_that_fails_leaves_the_old_one(capsys, tmp_path):
     path = tmp_path / "x.png"
     path.write_bytes(b"old")
-    assert run(capsys, "plot", "nickel", "-o", path, "--kind", "hits")[0] == 1
+    assert run(capsys, "plot", "nickel", "-o", path, "--kind", "hits", "--overwrite")[0] == 1
     assert path.read_bytes() == b"old"
 
 

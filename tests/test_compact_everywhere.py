@@ -1,6 +1,5 @@
 """A compact material, from its file, in every command, exporter and renderer."""
 
-import json
 import subprocess
 
 import numpy as np
@@ -12,7 +11,7 @@ from sommerl.errors import MaterialError
 from sommerl.formats import merl, rgl
 from sommerl.load import interpolated
 from sommerl.nodes import NodeLattice
-from sommerl.render.bsdf import make_bsdf, register
+from sommerl.render.bsdf import make_bsdf, register, snippet
 from sommerl.render.llvm import drjit, mitsuba
 
 LATTICE = NodeLattice((0, 60, 120, 180), (0, 0, 1, 1), ((0, 60, 180), (0, 180)), ((0, 90), (0,)))
@@ -157,7 +156,7 @@ def test_mitsuba(capsys, path, tmp_path, extension):
     register()
     run_json(capsys, "convert", path, tmp_path / f"x.{extension}")
     if extension == "json":
-        bsdf = mi.load_dict(json.loads((tmp_path / "x.json").read_text()))
+        bsdf = mi.load_dict(snippet(tmp_path / "x.json"))
     else:
         shape = '<shape type="sphere"><ref id="x"/></shape>'
         (tmp_path / "scene.xml").write_text(f'<scene version="3.0.0"><include filename="x.xml"/>{shape}</scene>')

@@ -186,8 +186,8 @@ class Made(Brdf):
     ("value", "message"),
     [
         (0.0, "made: expected a positive reflectance in some direction, found none"),
-        (float("nan"), "made: expected finite reflectance of at least 0, found others in 1000 of 1000 directions"),
-        (float("inf"), "made: expected finite reflectance of at least 0, found others in 1000 of 1000 directions"),
+        (float("nan"), "made: expected a positive reflectance in some direction, found none"),
+        (float("inf"), "made: expected a largest reflectance of 1e-15 to 1e+15, found 3.40282e+38"),
         (-0.1, "made: expected finite reflectance of at least 0, found others in 1000 of 1000 directions"),
         (1e-200, "made: expected a largest reflectance of 1e-15 to 1e+15, found 1e-200"),
         (1e160, "made: expected a largest reflectance of 1e-15 to 1e+15, found 1e+160"),

@@ -58,7 +58,7 @@ def test_spectra_are_the_same_colours(tmp_path):
     rgl_export.write(source, tmp_path / "spec.bsdf", spectral=True)
     one, other = (load(tmp_path / f"{kind}.bsdf").eval(A, B) for kind in ("rgb", "spec"))
     assert np.allclose(one, other, rtol=1e-4, atol=1e-6)
-    fields = tensor.TensorFile(tmp_path / "spec.bsdf").fields
+    fields = tensor.TensorFile(tmp_path / "spec.bsdf", (tmp_path / "spec.bsdf").read_bytes()).fields
     assert "rgb" not in fields
     assert fields["spectra"].shape == (1, 48, 21, 96, 96)
 
@@ -92,7 +92,7 @@ def test_primaries():
 def test_what_pbrt_reads(tmp_path):
     """The shapes and types that pbrt-v4's reader asks for."""
     rgl_export.write(lambertian_table(), tmp_path / "x.bsdf", spectral=True)
-    fields = tensor.TensorFile(tmp_path / "x.bsdf").fields
+    fields = tensor.TensorFile(tmp_path / "x.bsdf", (tmp_path / "x.bsdf").read_bytes()).fields
     angles = fields["phi_i"].shape + fields["theta_i"].shape
     assert all(fields[name].dtype == np.float32 for name in ("theta_i", "phi_i", "ndf", "sigma", "vndf", "luminance"))
     assert all(fields[name].dtype == np.float32 for name in ("wavelengths", "spectra"))

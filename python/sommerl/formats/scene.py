@@ -43,7 +43,6 @@ def write(material: str | Path, path: str | Path) -> None:
         # Where the folders really are: from behind a link, ".." leads elsewhere.
         place = os.path.relpath(Path(os.path.realpath(file.parent)) / file.name, os.path.realpath(path.parent))
         name = Path(place).as_posix() + (f":{member}" if member else "")
-    _check_utf8(path, name)
     for text in (name, path.name) if xml else ():
         if "$" in text or visible(text) != text:
             raise FormatError(
@@ -53,14 +52,6 @@ def write(material: str | Path, path: str | Path) -> None:
     text = _xml(name, path) if xml else _json(name, path)
     with atomic_write(path) as out:
         out.write(text.encode())
-
-
-def _check_utf8(path: Path, name: str) -> None:
-    """Raises FormatError for a name that is no text, which Mitsuba could not be given."""
-    try:
-        name.encode()
-    except UnicodeEncodeError as error:
-        raise FormatError(f"{path}: expected names in UTF-8, found {name}") from error
 
 
 def _xml(name: str, path: Path) -> str:
