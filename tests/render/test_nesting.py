@@ -202,10 +202,11 @@ def squares(bsdfs, integrator):
     """Square samples in a row, which do not see each other, under an even sky; each is SIZE pixels wide."""
     count, transform = len(bsdfs), mi.ScalarTransform4f
     film = {"type": "hdrfilm", "width": SIZE * count, "height": SIZE, "rfilter": {"type": "box"}, "pixel_format": "rgb"}
-    view = transform().look_at([0, 0, 5], [0, 0, 0], [0, 1, 0]).scale([count, count, 1])
+    view = {"to_world": transform().look_at([0, 0, 50], [0, 0, 0], [0, 1, 0]), "fov_axis": "x"}
+    view["fov"] = 2 * np.degrees(np.arctan(count / 50))
     kind = {"type": integrator} | ({"aovs": "albedo:albedo", "image": {"type": "path"}} if integrator == "aov" else {})
     scene = {"type": "scene", "sky": {"type": "constant"}, "integrator": kind}
-    scene["camera"] = {"type": "orthographic", "to_world": view, "film": film}
+    scene["camera"] = {"type": "perspective", **view, "film": film}
     for number, each in enumerate(bsdfs):
         # From the camera's left to its right, leaning back.
         place = transform().translate([2 * number + 1 - count, 0, 0]).rotate([1, 0, 0], 40).scale(0.9)
