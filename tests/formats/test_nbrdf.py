@@ -73,6 +73,14 @@ def test_every_kind_of_file(tmp_path):
     check_network(load(tmp_path / "many.npz:chrome"), OTHER)
 
 
+def test_arrays_that_python_2_wrote(tmp_path):
+    np.save(tmp_path / "x.npy", FLAT)
+    whole = (tmp_path / "x.npy").read_bytes()
+    assert b"(675,), } " in whole
+    (tmp_path / "x.npy").write_bytes(whole.replace(b"(675,), } ", b"(675L,), }"))
+    check_network(load(tmp_path / "x.npy"))
+
+
 def test_it_renders():
     mi = mitsuba()
     brdf = NeuralBrdf.from_flat(FLAT, name="x")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import warnings
 import zipfile
 import zlib
 from pathlib import Path
@@ -61,7 +62,9 @@ def _array(path: Path, name: str, stream: IO[bytes], length: int) -> NDArray[Any
         if version not in ((1, 0), (2, 0)):
             raise FormatError(f"{path}: {name}: expected NumPy's format 1.0 or 2.0, found {version[0]}.{version[1]}")
         header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        shape, fortran, dtype = header(stream, MOST_HEADER)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of files that Python 2 wrote: they are read all the same
+            shape, fortran, dtype = header(stream, MOST_HEADER)
         size = math.prod(shape) * dtype.itemsize
         plain = dtype.subdtype is None and not dtype.hasobject and len(shape) <= MOST_AXES
         if not plain or any(type(n) is not int or n < 0 for n in shape) or not 0 < size <= min(length, LARGEST_ARRAY):

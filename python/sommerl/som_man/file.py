@@ -65,7 +65,7 @@ def save(material: SomManBrdf, path: str | Path) -> int:
         )
     if Path(path).suffix.lower() != ".smrl":
         raise OptionError(f"{path}: expected a name that ends in .smrl, found {Path(path).suffix!r}")
-    notes.check(material.options, material.metrics)
+    notes.parsed(_noted(material))
     data = encode(material)
     with atomic_write(Path(path)) as out:
         out.write(data)
@@ -84,11 +84,15 @@ def parse(path: Path, data: bytes) -> SomManBrdf:
 
 def encode(material: SomManBrdf) -> bytes:
     """The bytes of a material file. The same material always gives the same bytes."""
-    noted = notes.written(made_from=list(material.made_from), metrics=material.metrics, options=material.options)
+    noted = _noted(material)
     nodes = isinstance(material.lattice, NodeLattice)
     body = _head(NODES if nodes else CELLS, material.name, material.source_sha256, noted)
     body += _nodes(material) if nodes else _cells(material)
     return container.sealed(MAGIC, VERSION, body)
+
+
+def _noted(material: SomManBrdf) -> bytes:
+    return notes.written(made_from=list(material.made_from), metrics=material.metrics, options=material.options)
 
 
 def head_bytes(name: str, source_sha256: str, made_from: Sequence[Link]) -> int:

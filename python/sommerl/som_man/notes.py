@@ -40,7 +40,7 @@ KNOWN: dict[str, dict[str, str]] = {
 
 
 def written(**known: Any) -> bytes:
-    """What there is to say, for a file. Raises FormatError for what a file cannot note."""
+    """What there is to say, for a file. Raises FormatError for what JSON cannot hold; for the rest, see `parsed`."""
     said = {key: value for key, value in known.items() if value}
     if not said:
         return b""
@@ -48,7 +48,6 @@ def written(**known: Any) -> bytes:
         data = json.dumps(said, sort_keys=True, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
     except (TypeError, ValueError, RecursionError) as error:
         raise FormatError(f"expected notes that JSON can hold, found others ({error})") from error
-    parsed(data)
     return data
 
 
