@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -93,3 +94,14 @@ def run_json(capsys: pytest.CaptureFixture[str], *arguments: object) -> Any:
     status, out, err = run(capsys, *arguments, "--json")
     assert (status, err) == (0, "")
     return json.loads(out)
+
+
+@contextmanager
+def interrupting(what: str):
+    """A progress bar, in place of `console.progress`, under which a command is interrupted at its second step."""
+
+    def advance(done: int, total: int) -> None:
+        if done == 2:
+            raise KeyboardInterrupt
+
+    yield advance

@@ -4,10 +4,9 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
 
 import pytest
-from helpers import run, run_json
+from helpers import interrupting, run, run_json
 
 from sommerl import console
 from sommerl.render import checkpoint, passes
@@ -131,15 +130,6 @@ CHANGES = {
     "reference 1": ["--against", "nickel"],
     "scene": ["--scene", "sphere"],
 }
-
-
-@contextmanager
-def interrupting(what):
-    def advance(done, total):
-        if done == 2:
-            raise KeyboardInterrupt
-
-    yield advance
 
 
 @pytest.mark.parametrize("what", CHANGES)

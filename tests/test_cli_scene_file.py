@@ -1,11 +1,10 @@
 """The command `render` with a scene file of the user's own."""
 
 import re
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from helpers import lambertian_table, must_fail, run, run_json
+from helpers import interrupting, lambertian_table, must_fail, run, run_json
 
 from sommerl import TrainOptions, console, save, train
 from sommerl.formats import scene as snippets
@@ -214,15 +213,6 @@ def test_what_is_read_is_never_written_over(capsys, folder):
     for output in (texture, folder / "scene.xml"):
         assert run(capsys, "render", folder / "scene.xml", *LIGHT, "-o", output)[0] == 2
     assert texture.read_bytes() == before
-
-
-@contextmanager
-def interrupting(what):
-    def advance(done, total):
-        if done == 2:
-            raise KeyboardInterrupt
-
-    yield advance
 
 
 def stop(capsys, monkeypatch, *arguments):
