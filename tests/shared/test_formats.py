@@ -28,8 +28,8 @@ def test_rgl_as_mitsuba_evaluates_it(path):
     mi, dr = mitsuba(), drjit()
     bsdf = mi.load_dict({"type": "measured", "filename": str(path)})
     si = dr.zeros(mi.SurfaceInteraction3f, len(B))
-    si.wi = mi.Vector3f(*B.T.astype(np.float32))
-    theirs = np.array(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(*A.T.astype(np.float32)))).T
+    si.wi = _vectors(B.T)
+    theirs = np.array(bsdf.eval(mi.BSDFContext(), si, _vectors(A.T))).T
     ours = rgl.read(path, reciprocal=False).eval(A, B) * A[:, 2:]
     assert np.all(np.abs(ours - theirs) <= 1e-3 * np.abs(theirs) + 1e-7)
 
@@ -41,12 +41,18 @@ class InMitsuba(Brdf):
         self.name, self._path = "measured", str(path)
 
     def f_r(self, wi, wo, buffers):
+        """wi, wo: triples of NumPy's arrays or of Dr.Jit's."""
         mi, dr = mitsuba(), drjit()
         si = dr.zeros(mi.SurfaceInteraction3f, dr.width(wi[0]))
-        si.wi = mi.Vector3f(*wo)
+        si.wi = _vectors(wo)
         bsdf = mi.load_dict({"type": "measured", "filename": self._path})
-        value = bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(*wi)) / wi[2]
-        return value.x, value.y, value.z
+        value = bsdf.eval(mi.BSDFContext(), si, _vectors(wi))
+        return [(np.array(x) if isinstance(wi[2], np.ndarray) else x) / wi[2] for x in value]
+
+
+def _vectors(triple):
+    mi = mitsuba()
+    return mi.Vector3f(*(w.astype(np.float32).ravel() if isinstance(w, np.ndarray) else w for w in triple))
 
 
 def psnr(reference, candidate):
@@ -61,9 +67,9 @@ def test_rgl_as_a_table():
 
 @pytest.mark.parametrize("name", STAND_INS)
 def test_stand_ins_as_rgl_files(stand_in, tmp_path, name):
+    """In Mitsuba; our reader gives the same values, as tested above."""
     source = load(stand_in(name))
     rgl_export.write(source, tmp_path / "x.bsdf")
-    assert psnr(source, rgl.read(tmp_path / "x.bsdf", reciprocal=False)) >= 45
     assert psnr(source, InMitsuba(tmp_path / "x.bsdf")) >= 45
 
 
