@@ -36,16 +36,18 @@ import numpy as np
 
 import sommerl
 from sommerl import Lattice, container, door
-from sommerl.errors import SommerlError
+from sommerl.errors import FormatError, SommerlError
 from sommerl.factored import file as fbrdf
 from sommerl.factored.material import COLUMNS, ELEVATIONS, ROWS, FactoredBrdf
 from sommerl.formats import arrays_on_disk, cornell, fits, merl, nbrdf, samples, tensor, text
 from sommerl.models.multi_lobe import FAMILIES, Lobe
 from sommerl.models.nbrdf import SHAPES, WEIGHTS
 from sommerl.nodes import NodeLattice
+from sommerl.render import checkpoint
 from sommerl.som_man import file as smrl
 from sommerl.som_man.codes import gain_values, shape_values
 
+FRAME = (4, 5)  # pixels of a checkpoint's images
 TOO_LONG = 20  # seconds for one load
 KEPT = 5  # reproducers of a reader
 EXTREMES = (0, 1, 2, 0x7F, 0x80, 0xFF, 0x7FFF, 0xFFFF, 2**31 - 1, 2**31, 2**32 - 1, 2**63, 2**64 - 1)
@@ -466,6 +468,41 @@ def sampled(found: Any) -> None:
 
 
 LARGEST_IMAGE = 2**30
+
+
+def checkpoint_seeds() -> list[bytes]:
+    rng = np.random.default_rng(0)
+    image = checkpoint.Image(rng.random((*FRAME, 3)).astype("f4"), rng.random(FRAME) < 0.5)
+    states = checkpoint.State((image,), rng.random((*FRAME, 3)), 2), checkpoint.State((image, image))
+    with tempfile.TemporaryDirectory() as folder:
+        for number, state in enumerate(states):
+            _render(Path(folder) / str(number)).save(state, now=True)
+        return [(Path(folder) / str(number)).read_bytes() for number in range(len(states))]
+
+
+def resumed(path: Path) -> checkpoint.State:
+    """What a render goes on from; a FormatError where it starts anew."""
+    said: list[str] = []
+    state = _render(path, said.append).load({}, images=2, passes=5)
+    if said:
+        aside = path.with_name(f"{path.name}.damaged")
+        if aside.exists():
+            aside.rename(path)
+        raise FormatError(said[0])
+    return state
+
+
+def _render(path: Path, say: Callable[[str], None] = print) -> checkpoint.Checkpoint:
+    return checkpoint.Checkpoint(path, {"scene": "sphere"}, FRAME, say)
+
+
+def resumable(state: checkpoint.State) -> None:
+    images = [(image.pixels.shape, image.mask.shape) for image in state.images]
+    total = state.total is None or state.total.shape == (*FRAME, 3)
+    if images != [((*FRAME, 3), FRAME)] * len(images) or not total or state.passes > 5:
+        raise ArithmeticError("a state that was taken is of another shape than the render")
+
+
 READERS = [
     Reader("smrl-nodes", ".smrl", lambda: smrl_seeds(True), sommerl.load, smrl.LONGEST_FILE, evaluated, sealed),
     Reader(
@@ -504,6 +541,7 @@ READERS = [
     Reader("exr", ".exr", lambda: image_seeds("OpenEXR"), load_environment, LARGEST_IMAGE, finite),
     Reader("hdr", ".hdr", lambda: image_seeds("RGBE"), load_environment, LARGEST_IMAGE, finite),
     Reader("pfm", ".pfm", lambda: image_seeds("PFM"), load_environment, LARGEST_IMAGE, finite),
+    Reader("checkpoint", ".sommerl-part", checkpoint_seeds, resumed, checkpoint.LARGEST_FILE, resumable, sealed),
     # Any other reader of files: a name, the extension, seeds, what loads a path, how much it may read, what uses it.
 ]  # fmt: skip
 BY_NAME = {reader.name: reader for reader in READERS}
