@@ -1,6 +1,7 @@
 import os
 import subprocess
 import sys
+from functools import cache
 
 import numpy as np
 import pytest
@@ -135,11 +136,16 @@ def check_draws(bsdf, degrees, power=1.0):
     check_drawn_from(counted(drawn, degrees), expected(pdf, degrees), len(ANGLES) * len(SAMPLERS))
 
 
+@cache
+def sampler(name):
+    return SAMPLERS[name].fitted(table("blue-metallic-paint"))
+
+
 @pytest.mark.parametrize("degrees", ANGLES)
 @pytest.mark.parametrize("name", SAMPLERS)
 def test_directions_are_drawn_from_the_density_of_every_sampler(name, degrees):
     brdf = table("blue-metallic-paint")
-    bsdf = make_bsdf(brdf, SAMPLERS[name].fitted(brdf))
+    bsdf = make_bsdf(brdf, sampler(name))
     check_draws(bsdf, degrees)
     must_fail(check_draws, bsdf, degrees, 1.1)
 
@@ -147,7 +153,7 @@ def test_directions_are_drawn_from_the_density_of_every_sampler(name, degrees):
 @pytest.mark.parametrize("name", SAMPLERS)
 def test_sample_weight_is_value_over_density(name):
     brdf = table("blue-metallic-paint")
-    bsdf = make_bsdf(brdf, SAMPLERS[name].fitted(brdf))
+    bsdf = make_bsdf(brdf, sampler(name))
     si = interaction(random_directions(10_000, 3).T)
     u = np.random.default_rng(1).random((3, 10_000)).astype(np.float32)
     sample, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(u[0]), mi.Point2f(u[1], u[2]))
