@@ -256,7 +256,7 @@ def test_renders_of_nested_bsdfs_are_mixtures_of_their_parts(integrator):
     spp, noticed = (4096, 0.3) if integrator == "ptracer" else (16, 0.9)
     found, errors = rendered([nest(bsdf(kind, sampler)) for kind, sampler, (nest, _) in shown], integrator, spp)
     check_shows_the_mixtures(kinds, found, errors, shares)
-    broken = [(noticed * ours, grey, behind) for ours, grey, behind in shares]
+    broken = [(noticed * ours, noticed * grey, behind) for ours, grey, behind in shares]
     must_fail(check_shows_the_mixtures, kinds, found, errors, broken)
     if integrator == "aov":
         assert (found[:, 3:] >= 0).all()
