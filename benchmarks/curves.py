@@ -10,7 +10,7 @@ from typing import Any
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from sommerl.console import size
+from sommerl.commands.console import size
 
 COLOURS = {
     "compact": "#0059b3",

@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import sommerl
-from sommerl import console
-from sommerl.brdf import Brdf
+from sommerl.commands import console
 from sommerl.factored import file
 from sommerl.factored.fit import FactorOptions, factor
-from sommerl.metrics import asymmetry
+from sommerl.reflectance.brdf import Brdf
+from sommerl.reflectance.distance import asymmetry
 from sommerl.render.compare import judge_on_sphere
 from sommerl.render.environment import default_environment
 

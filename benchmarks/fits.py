@@ -23,9 +23,9 @@ from sommerl.fitting.data import samples_of
 from sommerl.fitting.objective import LOG_EPSILON
 from sommerl.fitting.options import FitOptions, Loss, families_of
 from sommerl.fitting.search import Search
-from sommerl.formats.scattered import Samples
 from sommerl.models.family import Family
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
+from sommerl.reflectance.samples import Samples
 
 MATERIALS = ("blue-metallic-paint", "yellow-matte-plastic", "beige-fabric")
 STARTS = 50

@@ -35,17 +35,18 @@ from typing import Any
 import numpy as np
 
 import sommerl
-from sommerl import Lattice, container, door
-from sommerl.errors import FormatError, SommerlError
+from sommerl import Lattice
+from sommerl.compression.smrl import file as smrl
+from sommerl.compression.smrl.codes import gain_values, shape_values
 from sommerl.factored import file as fbrdf
 from sommerl.factored.material import COLUMNS, ELEVATIONS, ROWS, FactoredBrdf
-from sommerl.formats import arrays_on_disk, cornell, fits, merl, nbrdf, samples, tensor, text
+from sommerl.formats import cornell, fits, merl, nbrdf, numpy_files, samples, tensor, text
 from sommerl.models.multi_lobe import FAMILIES, Lobe
 from sommerl.models.nbrdf import SHAPES, WEIGHTS
-from sommerl.nodes import NodeLattice
+from sommerl.reflectance.nodes import NodeLattice
 from sommerl.render import checkpoint
-from sommerl.som_man import file as smrl
-from sommerl.som_man.codes import gain_values, shape_values
+from sommerl.system import door, sealed_file
+from sommerl.system.errors import FormatError, SommerlError
 
 FRAME = (4, 5)  # pixels of a checkpoint's images
 TOO_LONG = 20  # seconds for one load
@@ -249,7 +250,7 @@ def evaluated(brdf: Any) -> None:
 
 def sealed(rng: random.Random, whole: bytes, mutate: Mutate) -> bytes:
     """Our own files, damaged below their checksum."""
-    body = mutate(rng, whole[container.PREFIX.size :])
+    body = mutate(rng, whole[sealed_file.PREFIX.size :])
     return whole[:6] + struct.pack("<I", zlib.crc32(body)) + body
 
 
@@ -265,7 +266,7 @@ def inflated(head: Callable[[bytes], int]) -> Callable[[random.Random, bytes, Mu
             place = rng.randrange(len(payload))
             part = rng.choice((rng.randbytes(8), b"\xff" * 8, b"\0" * 8, struct.pack("<d", rng.choice((1e308, -1e-9)))))
             payload[place : place + 8] = part[: len(payload) - place]
-        body = whole[container.PREFIX.size : at] + container.deflated(bytes(payload))
+        body = whole[sealed_file.PREFIX.size : at] + sealed_file.deflated(bytes(payload))
         return whole[:6] + struct.pack("<I", zlib.crc32(body)) + body
 
     return build
@@ -296,7 +297,7 @@ def smrl_seeds(nodes: bool) -> list[bytes]:
 
 
 def stream_of_cells(whole: bytes) -> int:
-    at = container.PREFIX.size + 1
+    at = sealed_file.PREFIX.size + 1
     at += 1 + whole[at]
     at += 1 + whole[at]
     at += 2 + struct.unpack_from("<H", whole, at)[0]
@@ -310,7 +311,7 @@ def fbrdf_seeds() -> list[bytes]:
 
 
 def stream_of_factors(whole: bytes) -> int:
-    at = container.PREFIX.size
+    at = sealed_file.PREFIX.size
     at += 1 + whole[at]
     return at + 1 + whole[at] + fbrdf.TERMS.size
 
@@ -516,11 +517,11 @@ READERS = [
     Reader("fits", ".json", fits_seeds, sommerl.load, fits.LARGEST_FILE, evaluated),
     Reader(
         "nbrdf-npy", ".npy", lambda: [npy(weights()), npy(weights().astype("f4"))], sommerl.load,
-        arrays_on_disk.LARGEST_FILE, evaluated,
+        numpy_files.LARGEST_FILE, evaluated,
     ),
     Reader(
         "nbrdf-npz", ".npz", lambda: [npz(**layers()), npz(nickel=weights())], sommerl.load,
-        arrays_on_disk.LARGEST_FILE, evaluated, zipped,
+        numpy_files.LARGEST_FILE, evaluated, zipped,
     ),
     Reader("nbrdf-h5", ".h5", hdf5_seeds, sommerl.load, nbrdf.LARGEST_FILE, evaluated),
     Reader(
@@ -528,7 +529,7 @@ READERS = [
     ),
     Reader(
         "samples-npz", ".npz", lambda: [npz(**dict(zip(CSV.split(","), rows(3).T, strict=True)))],
-        without_table(samples), arrays_on_disk.LARGEST_FILE, sampled, zipped,
+        without_table(samples), numpy_files.LARGEST_FILE, sampled, zipped,
     ),
     Reader("samples-table", ".csv", lambda: [table_of_text(CSV, 3)], sommerl.load, text.LARGEST_FILE, evaluated),
     Reader(

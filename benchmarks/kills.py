@@ -70,7 +70,7 @@ RUN = "from sommerl.__main__ import main; import sys; sys.exit(main())"
 EAGER = "from sommerl.render import checkpoint, passes; checkpoint.SECONDS = 0.0; passes.SAMPLES_A_PASS = 2**14; "
 BROKEN = """
 import contextlib, time
-from sommerl import files
+from sommerl.system import files
 @contextlib.contextmanager
 def in_place(path):
     with open(path, "wb") as out:

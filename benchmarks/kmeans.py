@@ -9,7 +9,7 @@ import faiss
 import numpy as np
 
 from sommerl import BrdfTable
-from sommerl.som_man.material import SomManBrdf
+from sommerl.compression.material import SomManBrdf
 
 ITERATIONS = 20
 # Of xz, as fits indices best: no alignment, no context of neighbouring bytes.

@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from sommerl import TrainOptions, load_table, train
-from sommerl.metrics import ImageMetrics
+from sommerl.compression.smrl.file import encode
 from sommerl.render.compare import compare_on_sphere
 from sommerl.render.environment import default_environment, load_environment
-from sommerl.som_man.file import encode
+from sommerl.render.metrics import ImageMetrics
 
 # material, clusters, epochs, which PSNR
 CASES = (

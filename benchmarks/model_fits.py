@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from sommerl import Brdf
-from sommerl.arrays import split
 from sommerl.fitting import FitOptions, fit
-from sommerl.half_diff import directions
 from sommerl.models.sgd import PARAMETERS, Angles, ShiftedGamma, channel
+from sommerl.reflectance.arrays import split
+from sommerl.reflectance.half_diff import directions
 
 Array = NDArray[np.float64]
 Residuals = Callable[[Array, int], Array]  #: for parameters, at every so manieth pair

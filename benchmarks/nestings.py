@@ -22,7 +22,7 @@ A_CHILD = 100  # renders
 # One after the other. Those that compile take ten times as long.
 VARIANTS = ("llvm_ad_rgb", *3 * ("scalar_rgb", "scalar_spectral", "scalar_spectral_polarized"))
 OTHERS = {10: "llvm_ad_spectral", 20: "llvm_ad_mono"}  # by the number of the batch
-INTEGRATORS = ("path", "direct", "volpath", "ptracer", "prb", "aov")
+INTEGRATORS = ("path", "direct", "volpath", "ptracer", "aov", "prb")  # the last one is not for scalar variants
 DEEPEST = 2
 
 
@@ -82,9 +82,10 @@ def description(rng: np.random.Generator) -> dict[str, object]:
     from sommerl.render.llvm import mitsuba
 
     mi = mitsuba()
-    size = 3 if mi.variant().startswith("scalar") else 8
+    scalar = mi.variant().startswith("scalar")
+    size = 3 if scalar else 8
     transform = mi.ScalarTransform4f
-    integrator: dict[str, object] = {"type": str(rng.choice(INTEGRATORS))}
+    integrator: dict[str, object] = {"type": str(rng.choice(INTEGRATORS[:-1] if scalar else INTEGRATORS))}
     if integrator["type"] == "aov":
         integrator |= {"aovs": "a:albedo,n:sh_normal", "image": {"type": "path", "max_depth": 4}}
     else:

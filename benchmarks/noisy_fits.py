@@ -18,8 +18,8 @@ import numpy as np
 from sommerl import Brdf, builtin_table
 from sommerl.fitting import FitOptions, fit_models
 from sommerl.fitting.data import samples_of
-from sommerl.formats.scattered import Samples
-from sommerl.paper.data import compressed, expected
+from sommerl.reflectance.samples import Samples
+from sommerl.reproduction.data import compressed, expected
 
 
 def error(fitted: Brdf, truth: Samples) -> float:

@@ -25,8 +25,8 @@ import curves
 from representations import representations, short_name
 
 from sommerl import Brdf, BrdfTable, SommerlError, load
-from sommerl.load import EXTENSIONS
-from sommerl.metrics import table_metrics
+from sommerl.formats.load import EXTENSIONS
+from sommerl.reflectance.distance import table_metrics
 from sommerl.render.compare import compare_on_sphere
 from sommerl.render.environment import default_environment, load_environment
 

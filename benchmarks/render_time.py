@@ -30,18 +30,20 @@ import numpy as np
 from timing import interleaved, ratio, text
 
 import sommerl
-from sommerl import TrainOptions, console, load_table
-from sommerl.brdf import Brdf
+from sommerl import TrainOptions, load_table
+from sommerl.commands import console
+from sommerl.compression.compact import search
+from sommerl.compression.compact.search import CompactOptions
 from sommerl.factored.fit import factor
 from sommerl.fitting.fit import fit
 from sommerl.fitting.options import FitOptions
-from sommerl.metrics import image_metrics
+from sommerl.reflectance.brdf import Brdf
+from sommerl.render.frame import Scene
 from sommerl.render.llvm import mitsuba
-from sommerl.render.passes import Scene, render
+from sommerl.render.metrics import image_metrics
+from sommerl.render.passes import render
 from sommerl.render.scenes import STAGES, stage
 from sommerl.sampling.named import OURS
-from sommerl.som_man import budget
-from sommerl.som_man.budget import CompactOptions
 
 OURS_NAME = "som-man, M = 256"
 MODELS = (
@@ -61,7 +63,7 @@ def representations(source: str) -> dict[str, Brdf]:
     """Every way to hold a material, by name; ours first."""
     table = load_table(source).with_interpolation("nearest")
     material, _ = sommerl.train(table, TrainOptions())
-    compact, _ = budget.compress(table.with_interpolation("trilinear"), CompactOptions(target_size=8000))
+    compact, _ = search.compress(table.with_interpolation("trilinear"), CompactOptions(target_size=8000))
     found: dict[str, Brdf] = {
         OURS_NAME: material,
         "raw table": table,

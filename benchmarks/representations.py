@@ -15,11 +15,11 @@ from model_fits import GGX_PARAMETERS, SGD_PARAMETERS, fitted_ggx, fitted_sgd
 
 import sommerl
 from sommerl import Brdf, BrdfTable
+from sommerl.compression.compact.search import Compressor
 from sommerl.formats import merl, nbrdf
 from sommerl.models.nbrdf import WEIGHTS
 from sommerl.render.compare import judge_on_sphere
 from sommerl.render.environment import default_environment
-from sommerl.som_man.budget import Compressor
 
 PALETTES = (256, 1000)  # of k-means
 NUMBER = 4  # bytes: float32

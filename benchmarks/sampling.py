@@ -29,9 +29,9 @@ from scipy.ndimage import binary_erosion
 from timing import interleaved
 
 import sommerl
-from sommerl import console
-from sommerl.brdf import Brdf
+from sommerl.commands import console
 from sommerl.factored.fit import factor
+from sommerl.reflectance.brdf import Brdf
 from sommerl.render.bsdf import upload
 from sommerl.render.environment import default_environment
 from sommerl.render.llvm import drjit, mitsuba

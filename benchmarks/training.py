@@ -23,7 +23,7 @@ from minisom import MiniSom
 from timing import interleaved, ratio, text
 
 from sommerl import TrainOptions, _core, load_table
-from sommerl.som_man import train
+from sommerl.compression.paper import train
 
 MATERIALS = ("blue-metallic-paint", "nickel", "yellow-matte-plastic")
 CASES = tuple(product(("kohonen", "paper"), ("seeded", "table")))

@@ -6,10 +6,10 @@ import zlib
 import numpy as np
 
 from sommerl import SomManBrdf
-from sommerl.container import PREFIX
-from sommerl.nodes import FINE, NodeLattice
-from sommerl.som_man.codes import gain_values, shape_values
-from sommerl.som_man.file import MAGIC, VERSION, decode
+from sommerl.compression.smrl.codes import gain_values, shape_values
+from sommerl.compression.smrl.file import MAGIC, VERSION, decode
+from sommerl.reflectance.nodes import FINE, NodeLattice
+from sommerl.system.sealed_file import PREFIX
 
 # Bands, inner nodes of an axis at most, gains, shapes, and how the entries come.
 CASES = {

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from sommerl import container
 from sommerl.factored.file import MAGIC, VERSION
 from sommerl.factored.material import COLUMNS, ELEVATIONS, ROWS, FactoredBrdf
+from sommerl.system import sealed_file
 
 
 def made(lobes=2, terms=3, seed=0):
@@ -21,7 +21,7 @@ def even():
 
 def sealed(body, version=VERSION):
     """A file with a checksum that fits."""
-    return container.sealed(MAGIC, version, body)
+    return sealed_file.sealed(MAGIC, version, body)
 
 
 def arrays(material):

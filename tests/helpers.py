@@ -12,10 +12,10 @@ import pytest
 from numpy.typing import NDArray
 
 from sommerl import BrdfTable, Lattice, SomManBrdf
-from sommerl.cli import main
-from sommerl.errors import SommerlError
-from sommerl.nodes import NodeLattice
-from sommerl.som_man.codes import gain_values, shape_values
+from sommerl.commands.cli import main
+from sommerl.compression.smrl.codes import gain_values, shape_values
+from sommerl.reflectance.nodes import NodeLattice
+from sommerl.system.errors import SommerlError
 
 SMALL = Lattice(8, 8, 12)
 

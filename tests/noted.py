@@ -5,7 +5,7 @@ import struct
 
 from compact import material, sealed
 
-from sommerl.som_man.file import encode
+from sommerl.compression.smrl.file import encode
 
 ESCAPES = "\x1b]0;x\x07\x9b31m\u202e\u200b\x7f"
 FINE = [

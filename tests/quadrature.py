@@ -8,9 +8,9 @@ from functools import cache
 
 import numpy as np
 
-from sommerl.arrays import split
-from sommerl.half_diff import spherical
 from sommerl.models.family import Angles
+from sommerl.reflectance.arrays import split
+from sommerl.reflectance.half_diff import spherical
 
 ROWS, COLUMNS = 96, 32
 

@@ -6,9 +6,9 @@ import numpy as np
 from helpers import compact_material, lambertian_table
 
 from sommerl import BrdfTable, Lattice
-from sommerl.brdf import Brdf
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
-from sommerl.nodes import NodeLattice
+from sommerl.reflectance.brdf import Brdf
+from sommerl.reflectance.nodes import NodeLattice
 from sommerl.sampling.named import SAMPLERS
 
 ANGLES = (0, 45, 80, 88)  # of the viewer [degrees]

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from helpers import must_fail, run, run_json
 
+import sommerl
 from sommerl import NAMES, BrdfTable, Lattice, load
-from sommerl.cli import main
+from sommerl.commands.cli import main
 from sommerl.formats import merl
-from sommerl.load import load_table
+from sommerl.formats.load import load_table
 from sommerl.sampling.named import SAMPLERS
 
 QUICK = ["--clusters", "16", "--epochs", "1"]
@@ -90,16 +91,16 @@ def test_convert_there_and_back(capsys, folder, tmp_path):
 
 
 def test_convert_to_smrl_compresses_with_the_defaults(capsys, folder, tmp_path, monkeypatch):
-    import sommerl.commands
+    from sommerl.commands import compress
 
     seen = []
-    original = sommerl.commands.trained
+    original = compress.trained
 
     def quick(table, options):
         seen.append(options)
         return original(table, sommerl.TrainOptions(clusters=4, epochs=1))
 
-    monkeypatch.setattr(sommerl.commands, "trained", quick)
+    monkeypatch.setattr(compress, "trained", quick)
     result = run_json(capsys, "convert", folder / "pearl.binary", tmp_path / "x.smrl")
     assert seen == [sommerl.TrainOptions()]
     assert result.keys() >= COMPRESS_KEYS
@@ -171,9 +172,9 @@ def test_render_in_an_environment_from_a_file(capsys, folder, tmp_path):
 
 
 def test_demo(capsys, tmp_path, monkeypatch):
-    import sommerl.demo
+    from sommerl.commands import demo
 
-    monkeypatch.setattr(sommerl.demo, "TrainOptions", lambda: sommerl.TrainOptions(clusters=4, epochs=1))
+    monkeypatch.setattr(demo, "TrainOptions", lambda: sommerl.TrainOptions(clusters=4, epochs=1))
     result = run_json(capsys, "demo", "--out", tmp_path / "demo")
     assert result.keys() >= COMPRESS_KEYS | IMAGE_KEYS
     for path in result["output"].values():

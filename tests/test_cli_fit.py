@@ -10,7 +10,7 @@ from helpers import must_fail, run, run_json
 from sommerl import NAMES, BrdfTable, builtin
 from sommerl.formats import merl
 from sommerl.models.multi_lobe import FAMILIES
-from sommerl.paper.data import expected, material
+from sommerl.reproduction.data import expected, material
 
 QUICK = ["--samples", "2000", "--starts", "3"]
 

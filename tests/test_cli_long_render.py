@@ -8,7 +8,7 @@ import time
 import pytest
 from helpers import interrupting, run, run_json
 
-from sommerl import console
+from sommerl.commands import console
 from sommerl.render import checkpoint, passes
 from sommerl.render.environment import default_environment
 from sommerl.render.images import write_image

@@ -5,7 +5,7 @@ from helpers import must_fail, run, run_json
 from test_cli import BAD_FILES, check_refused
 
 from sommerl import plots
-from sommerl.cli import main
+from sommerl.commands.cli import main
 
 HEADS = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}
 

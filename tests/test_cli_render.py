@@ -5,11 +5,11 @@ import pytest
 from helpers import must_fail, run, run_json
 
 from sommerl import TrainOptions, builtin_table, save, train
-from sommerl.lattice import Lattice
-from sommerl.metrics import flip_map
+from sommerl.reflectance.cells import Lattice
 from sommerl.render.environment import default_environment
 from sommerl.render.images import encode, signed_difference, write_image
 from sommerl.render.llvm import mitsuba
+from sommerl.render.metrics import flip_map
 from sommerl.render.scenes import STAGES
 
 SMALL = ["--size", "24", "--spp", "4"]

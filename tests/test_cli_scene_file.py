@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from helpers import interrupting, lambertian_table, must_fail, run, run_json
 
-from sommerl import TrainOptions, console, save, train
+from sommerl import TrainOptions, save, train
+from sommerl.commands import console
 from sommerl.formats import scene as snippets
 from sommerl.render import checkpoint, passes
 from sommerl.render.bsdf import register

@@ -7,12 +7,12 @@ import pytest
 from helpers import compact_material, must_fail, random_directions, run, run_json, tool
 
 from sommerl import MERL, BrdfTable, load, save
-from sommerl.errors import MaterialError
 from sommerl.formats import merl, rgl
-from sommerl.load import interpolated
-from sommerl.nodes import NodeLattice
+from sommerl.formats.load import interpolated
+from sommerl.reflectance.nodes import NodeLattice
 from sommerl.render.bsdf import make_bsdf, register, snippet
 from sommerl.render.llvm import drjit, mitsuba
+from sommerl.system.errors import MaterialError
 
 LATTICE = NodeLattice((0, 60, 120, 180), (0, 0, 1, 1), ((0, 60, 180), (0, 180)), ((0, 90), (0,)))
 SMALL_PICTURE = ["--size", "24", "--spp", "4"]

@@ -5,8 +5,9 @@ import pytest
 from helpers import lambertian_table, must_fail, random_directions, run, run_json
 from rgl_files import content
 
-from sommerl import MERL, BrdfTable, Lattice, TrainOptions, builtin, commands, load, save, train
-from sommerl.cli import main
+from sommerl import MERL, BrdfTable, Lattice, TrainOptions, builtin, load, save, train
+from sommerl.commands import compress
+from sommerl.commands.cli import main
 from sommerl.formats import merl
 
 A, B = (w[w[:, 2] > 0.1][:200] for w in (random_directions(300, s) for s in (1, 2)))
@@ -60,7 +61,7 @@ def test_mostly_extrapolated(capsys, tmp_path):
 
 def test_names_of_outputs(capsys, tmp_path):
     (tmp_path / "x.bsdf").write_bytes(content())
-    assert commands._outputs([str(tmp_path / "x.bsdf"), "nickel"], tmp_path) == [
+    assert compress._outputs([str(tmp_path / "x.bsdf"), "nickel"], tmp_path) == [
         tmp_path / "x.smrl",
         tmp_path / "nickel.smrl",
     ]
@@ -133,7 +134,7 @@ def test_source_code(capsys, tmp_path, extension):
 
 def test_source_code_of_what_is_not_compressed_yet(capsys, tmp_path, monkeypatch):
     small = BrdfTable.sample(builtin("nickel"), Lattice(20, 20, 20))
-    monkeypatch.setattr("sommerl.convert.BrdfTable.of", lambda brdf: small)
+    monkeypatch.setattr("sommerl.commands.convert.BrdfTable.of", lambda brdf: small)
     run_json(capsys, "convert", "nickel", tmp_path / "nickel.h")
     assert "material_nickel" in (tmp_path / "nickel.h").read_text()
 

@@ -13,7 +13,7 @@ from compact import material, stream
 from helpers import must_fail
 
 from sommerl import _core
-from sommerl.som_man.file import encode
+from sommerl.compression.smrl.file import encode
 
 RNG = np.random.default_rng(0)
 F32 = RNG.random((40, 3)).astype(np.float32)

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from kinds import KINDS
 from sampled import sampler
 
-from sommerl.brdf import Brdf
 from sommerl.formats.rgl import RglBrdf
-from sommerl.formats.scattered import Samples, to_table
+from sommerl.formats.scattered import to_table
+from sommerl.reflectance.brdf import Brdf
+from sommerl.reflectance.samples import Samples
 from sommerl.sampling.named import SAMPLERS
 
 A, B = random_directions(50, 1), random_directions(50, 2)

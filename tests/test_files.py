@@ -11,16 +11,18 @@ from helpers import SMALL, compact_material, complaint, lambertian_table, must_f
 from sampled import NODES
 
 from sommerl import MERL, BrdfTable, TrainOptions, builtin, train
-from sommerl.errors import OptionError
+from sommerl.commands import paper as report
+from sommerl.commands.demo import write_page
+from sommerl.compression.smrl import file as smrl
 from sommerl.factored import file as fbrdf
 from sommerl.factored.fit import FactorOptions, factor
-from sommerl.files import atomic_write, check_writable, keeping
-from sommerl.formats import fits, merl, rgl_export, scene, shader
-from sommerl.paper import report
-from sommerl.paper.fits import FitRow, ImageRow
+from sommerl.formats import fits, merl, rgl_export, scene
+from sommerl.formats.shader import source as shader
 from sommerl.plots import lobes, page
-from sommerl.render.images import write_image, write_page
-from sommerl.som_man import file as smrl
+from sommerl.render.images import write_image
+from sommerl.reproduction.tables import FitRow, ImageRow
+from sommerl.system.errors import OptionError
+from sommerl.system.files import atomic_write, check_writable, keeping
 
 
 def test_a_file_appears_whole_or_not_at_all(tmp_path):
@@ -227,7 +229,7 @@ def test_sockets_are_refused(tmp_path):
 HALF = """
 import os, sys
 from pathlib import Path
-from sommerl.files import atomic_write
+from sommerl.system.files import atomic_write
 with atomic_write(Path(sys.argv[1])) as out:
     out.write(b"half")
     out.flush()

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from helpers import must_fail, random_directions
 
-from sommerl.arrays import split
-from sommerl.half_diff import directions, half_diff
+from sommerl.reflectance.arrays import split
+from sommerl.reflectance.half_diff import directions, half_diff
 
 
 def by_rotation(wi, wo):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from helpers import must_fail
 
-from sommerl import door
+from sommerl.system import door
 
 SCRIPT = Path(__file__).parents[1] / "benchmarks" / "hostile.py"
 DEAR = ("samples-table", "merl")  # a load of which takes seconds; their own tests damage them

@@ -12,18 +12,18 @@ import pytest
 from helpers import must_fail
 
 from sommerl import builtin
-from sommerl.interrupt import undisturbed
+from sommerl.system.interrupt import undisturbed
 
 INTERRUPTED = "error: interrupted; nothing was left half-written\n"
 PROGRAM = """
 import sys, time
 from pathlib import Path
-from sommerl import commands
+from sommerl.commands import info as command
 from sommerl.__main__ import main
 def info(options):
     {body}
     return {{}}
-commands.info = info
+command.info = info
 sys.argv = ["sommerl", "info", "x"]
 status = main()
 {after}
@@ -72,8 +72,8 @@ def test_two_signals_at_once_are_one():
 
 STUBBORN = """
     import os
-    from sommerl.files import atomic_write
-    from sommerl.interrupt import undisturbed
+    from sommerl.system.files import atomic_write
+    from sommerl.system.interrupt import undisturbed
     with atomic_write(Path("out")) as out:
         out.write(b"half"); out.flush()
         with undisturbed():
@@ -113,7 +113,7 @@ def test_an_ignored_signal_stays_so():
 
 
 def test_importing_the_library_leaves_signals_alone():
-    code = "import signal; before = [*map(signal.getsignal, signal.valid_signals())]; import sommerl.cli; "
+    code = "import signal; before = [*map(signal.getsignal, signal.valid_signals())]; import sommerl.commands.cli; "
     code += "assert before == [*map(signal.getsignal, signal.valid_signals())]"
     subprocess.run([sys.executable, "-c", code], check=True)
 

@@ -3,9 +3,9 @@ import pytest
 from helpers import SMALL, must_fail, random_directions
 
 from sommerl import MERL, Lattice
-from sommerl.arrays import split
-from sommerl.errors import MaterialError
-from sommerl.half_diff import directions, half_diff
+from sommerl.reflectance.arrays import split
+from sommerl.reflectance.half_diff import directions, half_diff
+from sommerl.system.errors import MaterialError
 
 NOT_RECIPROCAL = Lattice(phi_d=360, reciprocal=False)
 

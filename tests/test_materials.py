@@ -5,11 +5,11 @@ import pytest
 from helpers import SMALL, must_fail, random_directions
 
 from sommerl import MERL, NAMES, BrdfTable, builtin, builtin_table, load
-from sommerl.arrays import split
-from sommerl.errors import MaterialError
-from sommerl.half_diff import directions, half_diff
-from sommerl.materials import _FITS
+from sommerl.models.builtin import _FITS
 from sommerl.models.sgd import PARAMETERS
+from sommerl.reflectance.arrays import split
+from sommerl.reflectance.half_diff import directions, half_diff
+from sommerl.system.errors import MaterialError
 
 
 def by_hand(name, wi, wo, channel):

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from helpers import SMALL, must_fail
 
-from sommerl import metrics
-from sommerl.errors import MaterialError
+from sommerl.render import metrics
+from sommerl.system.errors import MaterialError
 
 RNG = np.random.default_rng(0)
 MASK = np.zeros((64, 64), bool)

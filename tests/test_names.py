@@ -8,10 +8,11 @@ import pytest
 from helpers import compact_material, must_fail, random_directions, run, run_json
 
 from sommerl import NAMES, builtin, load, save
-from sommerl.formats.shader import comment
-from sommerl.nodes import NodeLattice
+from sommerl.commands.demo import write_page
+from sommerl.formats.shader.source import comment
+from sommerl.plots.contact_sheet import captioned
 from sommerl.plots.page import text
-from sommerl.render.images import captioned, write_page
+from sommerl.reflectance.nodes import NodeLattice
 
 LATTICE = NodeLattice((0, 90, 180), (0, 0, 0), ((0, 90, 180),), ((0, 90),))
 NASTY = [

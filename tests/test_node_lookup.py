@@ -7,7 +7,7 @@ import pytest
 from helpers import must_fail, random_directions
 
 from sommerl import Brdf, BrdfTable, Lattice, _core
-from sommerl.nodes import FINE, FittedTable, NodeLattice
+from sommerl.reflectance.nodes import FINE, FittedTable, NodeLattice
 
 WIDE = tuple(range(0, FINE + 1, 4))
 SIX = [sorted({0, 180, *range(b + 1, 180, 7 * b + 9)}) for b in range(6)]

@@ -3,12 +3,12 @@ import pytest
 from helpers import must_fail, random_directions
 
 from sommerl import BrdfTable, Lattice
-from sommerl.arrays import split
-from sommerl.errors import MaterialError
-from sommerl.half_diff import directions
-from sommerl.nodes import FINE, FittedTable, NodeLattice, angles_at, damped, place
+from sommerl.reflectance.arrays import split
+from sommerl.reflectance.half_diff import directions
+from sommerl.reflectance.nodes import FINE, FittedTable, NodeLattice, angles_at, damped, place
 from sommerl.render.bsdf import make_bsdf, upload
 from sommerl.render.llvm import mitsuba
+from sommerl.system.errors import MaterialError
 
 LATTICE = NodeLattice(
     (0, 3, 40, 90, 180), (0, 0, 1, 1, 1), ((0, 60, 180), (0, 20, 90, 180)), ((0, 50, 90, 140), (0,))

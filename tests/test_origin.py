@@ -12,14 +12,16 @@ from factored_brdfs import made
 from helpers import lambertian_table, must_fail, run, run_json
 
 from sommerl import BrdfTable, TrainOptions, save, train
-from sommerl.container import PREFIX
-from sommerl.errors import FormatError
+from sommerl.compression.compact import lattice_fit as fit
+from sommerl.compression.compact import search
+from sommerl.compression.compact.search import CompactOptions
+from sommerl.compression.smrl import file
 from sommerl.factored import file as fbrdf
 from sommerl.factored.fit import FactorOptions, factor
-from sommerl.load import load
-from sommerl.origin import MOST_LINKS, full_chain, source_of
-from sommerl.som_man import budget, file, fit
-from sommerl.som_man.budget import CompactOptions
+from sommerl.formats.load import load
+from sommerl.reflectance.origin import MOST_LINKS, full_chain, source_of
+from sommerl.system.errors import FormatError
+from sommerl.system.sealed_file import PREFIX
 
 GOLDEN = Path(__file__).parent / "golden"
 QUICK = TrainOptions(clusters=1, epochs=1)
@@ -55,9 +57,9 @@ def test_by_the_preset_paper(tmp_path, source):
 
 def test_by_the_preset_compact(tmp_path, monkeypatch, source):
     """In the size that was asked for."""
-    monkeypatch.setattr(budget, "SPREAD", (1.0,))
+    monkeypatch.setattr(search, "SPREAD", (1.0,))
     monkeypatch.setattr(fit, "DIRECTIONS", 50_000)
-    material, report = budget.compress(load(source), CompactOptions(target_size=900))
+    material, report = search.compress(load(source), CompactOptions(target_size=900))
     written = save(material, tmp_path / "x.smrl")
     assert written <= 900
     assert written in [tried[0] for tried in report.tried]

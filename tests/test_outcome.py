@@ -6,8 +6,8 @@ import sys
 import pytest
 from helpers import must_fail, run
 
-from sommerl import commands
-from sommerl.errors import FormatError, OptionError
+from sommerl.commands import info
+from sommerl.system.errors import FormatError, OptionError
 
 
 class Panic(BaseException):
@@ -46,12 +46,12 @@ def failing(error):
 @pytest.mark.parametrize("kind", ERRORS)
 def test_an_error_of_any_kind_is_one_sentence(capsys, monkeypatch, kind):
     error, status, sentence = ERRORS[kind]
-    monkeypatch.setattr(commands, "info", failing(error))
+    monkeypatch.setattr(info, "info", failing(error))
     assert run(capsys, "info", "x") == (status, "", sentence)
 
 
 def test_where_it_came_from_on_request(capsys, monkeypatch):
-    monkeypatch.setattr(commands, "info", failing(KeyError("k\x1b")))
+    monkeypatch.setattr(info, "info", failing(KeyError("k\x1b")))
     monkeypatch.setenv("SOMMERL_DEBUG", "1")
     status, out, err = run(capsys, "info", "x")
     assert (status, out) == (1, "")

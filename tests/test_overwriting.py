@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from helpers import must_fail, run, run_json
 
-from sommerl.cli import main
+from sommerl.commands.cli import main
 
 SMALL = ["--size", "8", "--spp", "1"]
 # Of each command its options, with {} for the folder, and every file that it writes.

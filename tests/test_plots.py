@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from pictures import NICKEL, PAINT, Tilted, axes, drawn, palette_material
 
 from sommerl import MERL, Brdf, BrdfTable, builtin, plots
-from sommerl.errors import MaterialError, MissingDependencyError, OptionError
-from sommerl.half_diff import directions, spherical
 from sommerl.plots.curves import DIFFERENCES, INCIDENCES
 from sommerl.plots.tone import Tone
+from sommerl.reflectance.half_diff import directions, spherical
+from sommerl.system.errors import MaterialError, MissingDependencyError, OptionError
 
 # Curves
 
@@ -273,11 +273,11 @@ def test_bad_calls():
 
 
 def test_without_matplotlib(monkeypatch):
-    import sommerl.optional
+    import sommerl.system.optional
 
     def missing(module):
         raise ImportError(module)
 
-    monkeypatch.setattr(sommerl.optional.importlib, "import_module", missing)
+    monkeypatch.setattr(sommerl.system.optional.importlib, "import_module", missing)
     with pytest.raises(MissingDependencyError, match="plots: expected matplotlib, found none"):
         plots.sheet(PAINT)

@@ -7,9 +7,9 @@ from helpers import must_fail
 from pictures import ODD, drawn, palette_material
 
 from sommerl import MERL, BrdfTable, Lattice, SomManBrdf, plots
-from sommerl.half_diff import half_diff, spherical
 from sommerl.plots import lattice_hits
 from sommerl.plots.tone import Tone
+from sommerl.reflectance.half_diff import half_diff, spherical
 
 # Palettes
 

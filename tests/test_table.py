@@ -3,7 +3,7 @@ import pytest
 from helpers import SMALL, lambertian_table, must_fail, random_directions
 
 from sommerl import BrdfTable
-from sommerl.errors import MaterialError
+from sommerl.system.errors import MaterialError
 
 
 def test_lambertian_is_the_same_everywhere():
@@ -54,7 +54,7 @@ def test_values_that_no_measurement_has_are_clamped_and_counted():
 
 
 def share_by_hand(values, lattice, changed):
-    """The sums of `metrics.energy_share`, cell by cell."""
+    """The sums of `distance.energy_share`, cell by cell."""
     lost = all_ = 0.0
     theta_h, theta_d, _ = lattice.angles()
     cos_i, cos_o = lattice.cosines()

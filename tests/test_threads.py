@@ -8,8 +8,8 @@ import sys
 import pytest
 from helpers import must_fail, run
 
-from sommerl import threads
-from sommerl.errors import OptionError
+from sommerl.system import threads
+from sommerl.system.errors import OptionError
 
 # Runs some work, and meanwhile looks which threads use the processor: more than a twentieth of all time that is used,
 # which starting up and waiting for work may take.

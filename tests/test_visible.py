@@ -1,8 +1,8 @@
 import pytest
 from helpers import must_fail
 
-from sommerl.errors import FormatError, SommerlError
-from sommerl.visible import visible
+from sommerl.system.errors import FormatError, SommerlError
+from sommerl.system.visible import visible
 
 HIDDEN = (
     "\x00\x07\x1b\x7f\x80\x85\x9b\xad\u200b\u200d\u200e\u200f\u2028\u2029\u202a\u202e\u2066\u2069\ufeff"

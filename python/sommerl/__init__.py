@@ -1,29 +1,26 @@
 """Sommerl: measured reflectance as small material files that render fast and look like the measurement.
 
-Needs NumPy alone. Pictures, and the metrics on them, are in `sommerl.render` and `sommerl.metrics`; they need the
-packages of sommerl[render].
+Needs NumPy alone. Pictures, and the metrics on them, are in `sommerl.render`, and need the packages of sommerl[render].
 """
 
-import sys
 from importlib import import_module
-from types import ModuleType
 
-from . import threads  # before NumPy is imported
+from .system import threads  # before NumPy is imported
 
 TYPE_CHECKING = False  # as in `typing`, which takes long to load
 if TYPE_CHECKING:
     from typing import Any
 
-    from .brdf import Brdf
-    from .errors import SommerlError
-    from .lattice import MERL, Lattice
-    from .load import load, load_table
-    from .materials import NAMES, builtin, builtin_table
-    from .som_man.file import save
-    from .som_man.material import SomManBrdf
-    from .som_man.options import TrainOptions
-    from .som_man.train import TrainReport, train
-    from .table import BrdfTable
+    from .compression.material import SomManBrdf
+    from .compression.paper.options import TrainOptions
+    from .compression.paper.train import TrainReport, train
+    from .compression.smrl.file import save
+    from .formats.load import load, load_table
+    from .models.builtin import NAMES, builtin, builtin_table
+    from .reflectance.brdf import Brdf
+    from .reflectance.cells import MERL, Lattice
+    from .reflectance.table import BrdfTable
+    from .system.errors import SommerlError
 
 __version__ = "0.1.0"
 
@@ -47,21 +44,21 @@ __all__ = [
 ]
 
 _MODULES = {
-    "MERL": "lattice",
-    "NAMES": "materials",
-    "Brdf": "brdf",
-    "BrdfTable": "table",
-    "Lattice": "lattice",
-    "SomManBrdf": "som_man.material",
-    "SommerlError": "errors",
-    "TrainOptions": "som_man.options",
-    "TrainReport": "som_man.train",
-    "builtin": "materials",
-    "builtin_table": "materials",
-    "load": "load",
-    "load_table": "load",
-    "save": "som_man.file",
-    "train": "som_man.train",
+    "MERL": "reflectance.cells",
+    "NAMES": "models.builtin",
+    "Brdf": "reflectance.brdf",
+    "BrdfTable": "reflectance.table",
+    "Lattice": "reflectance.cells",
+    "SomManBrdf": "compression.material",
+    "SommerlError": "system.errors",
+    "TrainOptions": "compression.paper.options",
+    "TrainReport": "compression.paper.train",
+    "builtin": "models.builtin",
+    "builtin_table": "models.builtin",
+    "load": "formats.load",
+    "load_table": "formats.load",
+    "save": "compression.smrl.file",
+    "train": "compression.paper.train",
 }
 
 
@@ -71,14 +68,3 @@ def __getattr__(name: str) -> "Any":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     found = globals()[name] = getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
     return found
-
-
-class _Package(ModuleType):
-    """Here, `load` is the function, also once the module of that name has been imported."""
-
-    def __setattr__(self, name: str, value: object) -> None:
-        if name not in _MODULES or not isinstance(value, ModuleType):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package

@@ -7,7 +7,7 @@ import os
 import sys
 from collections.abc import Callable
 
-from .interrupt import STATUS, heed, remove_temporaries, undisturbed, unheeded
+from .system.interrupt import STATUS, heed, remove_temporaries, undisturbed, unheeded
 
 
 def main() -> int:
@@ -20,8 +20,8 @@ def main() -> int:
     try:
         heed()
         with undisturbed():
-            from .cli import main as run
-            from .outcome import fail, settled
+            from .commands.cli import main as run
+            from .commands.outcome import fail, settled
         status = _status(run) if outputs else fail("standard output: expected it open, found it closed", 1)
     except KeyboardInterrupt:
         unheeded()
@@ -41,7 +41,7 @@ def _status(run: Callable[[], int]) -> int:
 
 
 def _interrupted() -> None:
-    from .outcome import fail, settled
+    from .commands.outcome import fail, settled
 
     remove_temporaries()
     fail("interrupted; nothing was left half-written", STATUS)

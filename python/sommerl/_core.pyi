@@ -1,8 +1,8 @@
-"""The Rust core. `som_man/reference.py` says the same in plain NumPy.
+"""The Rust core. `compression/paper/reference.py` says the same in plain NumPy.
 
 What does not fit is a ValueError, if not a TypeError or an OverflowError of the conversion. threads: as many as there
-are processors if None, and in any case no more than `sommerl.threads.limit`. Where the system gives fewer, fewer do the
-work.
+are processors if None, and in any case no more than `sommerl.system.threads.limit`. Where the system gives fewer, fewer
+do the work.
 """
 
 from typing import Literal

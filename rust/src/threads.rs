@@ -5,9 +5,9 @@ use std::thread;
 
 use pyo3::prelude::*;
 
-/// As many as asked for, or as there are processors; but no more than the user's limit, `sommerl.threads.limit`.
+/// As many as asked for, or as there are processors; but no more than the user's limit, `sommerl.system.threads.limit`.
 pub fn allowed(py: Python, asked: Option<usize>) -> PyResult<usize> {
-    let limit: Option<usize> = py.import("sommerl.threads")?.call_method0("limit")?.extract()?;
+    let limit: Option<usize> = py.import("sommerl.system.threads")?.call_method0("limit")?.extract()?;
     let count = asked.or(limit).unwrap_or_else(processors);
     Ok(count.min(limit.unwrap_or(MOST)).clamp(1, MOST))
 }

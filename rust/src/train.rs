@@ -1,7 +1,7 @@
 //! Phases 1 and 2 of the paper: the SOM and, for each of its units, the MAN of three stored originals.
 //!
 //! The arithmetic is 32-bit, in the order written here, without fused multiply-add, and is the same,
-//! bit for bit, as in `python/sommerl/som_man/reference.py`.
+//! bit for bit, as in `python/sommerl/compression/paper/reference.py`.
 
 use crate::nearest::{Codebook, squared_distance};
 use crate::simd::{Path, Portable, Simd};

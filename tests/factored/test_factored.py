@@ -11,16 +11,16 @@ from helpers import complaint, lambertian_table, must_fail, random_directions
 from sampled import MATERIALS, Dim
 
 from sommerl import BrdfTable, Lattice
-from sommerl.arrays import split
-from sommerl.errors import MaterialError, MissingDependencyError, OptionError
 from sommerl.factored import fit
 from sommerl.factored.fit import MOST, FactorOptions, factor
 from sommerl.factored.material import FactoredBrdf
-from sommerl.half_diff import spherical
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
+from sommerl.reflectance.arrays import split
+from sommerl.reflectance.half_diff import spherical
 from sommerl.render.bsdf import upload
 from sommerl.render.llvm import mitsuba
 from sommerl.sampling.lawrence import LawrenceSampler
+from sommerl.system.errors import MaterialError, MissingDependencyError, OptionError
 
 A, B = random_directions(3000, 1), random_directions(3000, 2)
 FEW = FactorOptions(4, 2)

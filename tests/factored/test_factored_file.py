@@ -11,11 +11,12 @@ from helpers import must_fail, random_directions, run, run_json
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sommerl import container, load
-from sommerl.container import PREFIX
-from sommerl.errors import FormatError
+from sommerl import load
 from sommerl.factored.file import LONGEST_FILE, decode, encode, save
 from sommerl.factored.material import COLUMNS, ELEVATIONS, ROWS
+from sommerl.system import sealed_file
+from sommerl.system.errors import FormatError
+from sommerl.system.sealed_file import PREFIX
 
 A, B = random_directions(20, 1), random_directions(20, 2)
 GOLDEN = Path(__file__).parents[1] / "golden" / "factored.fbrdf"
@@ -102,7 +103,7 @@ def with_values(change):
     scale = np.ones(1, "<f4")
     change(halves, scale)
     planes = halves.view(np.uint8).reshape(-1, 2).T.tobytes()
-    return sealed(b"\0\0\1\1" + container.deflated(planes + scale.tobytes()))
+    return sealed(b"\0\0\1\1" + sealed_file.deflated(planes + scale.tobytes()))
 
 
 def nothing(halves, scale):
@@ -133,7 +134,7 @@ def test_bad_values_are_refused(change, message):
 @pytest.mark.parametrize("terms", [b"\0\1", b"\1\0", b"\x21\1", b"\1\xff"])
 def test_bad_terms_are_refused(terms):
     with pytest.raises(FormatError, match="expected 1 to 32 lobes and terms"):
-        decode(sealed(b"\0\0" + terms + container.deflated(b"")))
+        decode(sealed(b"\0\0" + terms + sealed_file.deflated(b"")))
 
 
 def test_other_terms_than_there_are_values():

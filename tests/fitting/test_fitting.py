@@ -6,11 +6,11 @@ from helpers import must_fail
 from scipy.optimize import least_squares
 
 from sommerl import Brdf, BrdfTable, Lattice, TrainOptions, builtin, train
-from sommerl.errors import MaterialError, OptionError
 from sommerl.fitting import FitOptions, fit, fit_all
 from sommerl.fitting.data import samples_of
 from sommerl.fitting.search import Search
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
+from sommerl.system.errors import MaterialError, OptionError
 
 COARSE = Lattice(24, 20, 24)
 SPECULAR = [name for name, family in FAMILIES.items() if not family.diffuse]

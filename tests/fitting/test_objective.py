@@ -7,8 +7,8 @@ from sommerl.fitting import FitOptions
 from sommerl.fitting.data import DIAMETER, lattice, samples_of, sphere
 from sommerl.fitting.objective import LOG_EPSILON, Objective, least_squares
 from sommerl.fitting.options import families_of
-from sommerl.lattice import MERL
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
+from sommerl.reflectance.cells import MERL
 
 LOSSES = ("l2", "cosine-l2", "log", "cube-root")
 SAMPLES = samples_of(builtin("purple-paint"), FitOptions(samples=3000))

@@ -7,7 +7,7 @@ import numpy as np
 from helpers import compact_material, random_directions, tool
 
 from sommerl import BrdfTable, Lattice, TrainOptions, builtin, train
-from sommerl.nodes import FINE, NodeLattice
+from sommerl.reflectance.nodes import FINE, NodeLattice
 
 A, B = random_directions(10_000, 1), random_directions(10_000, 2)
 A[:5], B[:5] = A[:5] * [1, 1, -1], B[:5]  # below the horizon

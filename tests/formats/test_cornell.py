@@ -7,9 +7,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from sommerl import load
-from sommerl.errors import FormatError
 from sommerl.formats import cornell
 from sommerl.formats.spectra import srgb_weights
+from sommerl.system.errors import FormatError
 
 A, B = (w[w[:, 2] > 0.2][:40] for w in (random_directions(80, s) for s in (1, 2)))
 WAVELENGTHS = [400, 450, 500, 550, 600, 650, 700]

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sommerl import load
-from sommerl.errors import FormatError
 from sommerl.formats import fits
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
+from sommerl.system.errors import FormatError
 
 A, B = random_directions(200, 1), random_directions(200, 2)
 LOBES = [

@@ -5,10 +5,10 @@ import pytest
 from helpers import must_fail, random_directions
 
 from sommerl import MERL, BrdfTable, Lattice, load
-from sommerl.arrays import split
-from sommerl.errors import FormatError, MaterialError
 from sommerl.formats import merl
-from sommerl.half_diff import half_diff
+from sommerl.reflectance.arrays import split
+from sommerl.reflectance.half_diff import half_diff
+from sommerl.system.errors import FormatError, MaterialError
 
 RNG = np.random.default_rng(0)
 

@@ -8,11 +8,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from sommerl import load
-from sommerl.errors import FormatError
-from sommerl.half_diff import half_diff
 from sommerl.models.nbrdf import SHAPES, WEIGHTS, NeuralBrdf
+from sommerl.reflectance.half_diff import half_diff
 from sommerl.render.bsdf import upload
 from sommerl.render.llvm import mitsuba
+from sommerl.system.errors import FormatError
 
 A, B = random_directions(500, 1), random_directions(500, 2)
 FLAT = np.random.default_rng(0).normal(scale=0.4, size=WEIGHTS)

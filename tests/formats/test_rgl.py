@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from rgl_files import content, fields
 
 from sommerl import MERL, load
-from sommerl.errors import FormatError
 from sommerl.formats import rgl, tensor
 from sommerl.formats.spectra import srgb_weights
+from sommerl.reflectance.table import BrdfTable
 from sommerl.render.llvm import drjit, mitsuba
-from sommerl.table import BrdfTable
+from sommerl.system.errors import FormatError
 
 ALL = (random_directions(12_000, seed) for seed in (1, 2))
 A, B = (w[w[:, 2] >= 0.05][:10_000].astype(np.float32).astype(float) for w in ALL)

@@ -3,16 +3,16 @@ import pytest
 from helpers import lambertian_table, must_fail, random_directions
 
 from sommerl import load
-from sommerl.errors import MaterialError
 from sommerl.formats import rgl, rgl_export, tensor
 from sommerl.formats.spectra import srgb_weights
-from sommerl.materials import builtin
-from sommerl.metrics import image_metrics
+from sommerl.models.builtin import builtin
 from sommerl.render.environment import default_environment
 from sommerl.render.llvm import mitsuba
+from sommerl.render.metrics import image_metrics
 from sommerl.render.passes import render
 from sommerl.render.scenes import sphere
 from sommerl.sampling.blinn_phong import BlinnPhongSampler
+from sommerl.system.errors import MaterialError
 
 A, B = (w[w[:, 2] > 0.1][:2000] for w in (random_directions(3000, s) for s in (1, 2)))
 

@@ -8,8 +8,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from sommerl import builtin, load
-from sommerl.errors import FormatError
 from sommerl.formats import samples
+from sommerl.system.errors import FormatError
 
 A, B = (w[w[:, 2] > 0.1][:60] for w in (random_directions(100, s) for s in (1, 2)))
 ANGLES = np.stack(

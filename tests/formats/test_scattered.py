@@ -3,10 +3,11 @@ import pytest
 from helpers import must_fail, random_directions
 
 from sommerl import MERL, BrdfTable, Lattice, builtin
-from sommerl.errors import FormatError, MissingDependencyError
-from sommerl.formats.scattered import Samples, to_table
-from sommerl.metrics import table_metrics
+from sommerl.formats.scattered import to_table
 from sommerl.plots import coverage
+from sommerl.reflectance.distance import table_metrics
+from sommerl.reflectance.samples import Samples
+from sommerl.system.errors import FormatError, MissingDependencyError
 
 A, B = (w[w[:, 2] > 0.1] for w in (random_directions(4000, s) for s in (1, 2)))
 A, B = A[:3000], B[:3000]
@@ -162,7 +163,7 @@ def test_scipy_is_asked_for_by_a_sentence(monkeypatch):
     def missing(name):
         raise ImportError(name)
 
-    monkeypatch.setattr("sommerl.optional.importlib.import_module", missing)
+    monkeypatch.setattr("sommerl.system.optional.importlib.import_module", missing)
     with pytest.raises(MissingDependencyError, match=r"install sommerl\[formats\]"):
         to_table(sampled(builtin("red-fabric")), name="x")
 

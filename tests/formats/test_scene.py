@@ -8,11 +8,11 @@ import pytest
 from helpers import check_sentence, complaint, lambertian_table, must_fail
 
 from sommerl import TrainOptions, save, train
-from sommerl.errors import FormatError
 from sommerl.formats import scene
 from sommerl.models.nbrdf import WEIGHTS
 from sommerl.render.bsdf import register, snippet
 from sommerl.render.llvm import mitsuba
+from sommerl.system.errors import FormatError
 
 SCENE = """<scene version="3.0.0">
   <include filename="grey.xml"/>

@@ -7,8 +7,8 @@ from helpers import compact_material, must_fail, tool
 from shader_programs import CASES, COMPACT, A, B, compact, material, run, validate
 
 from sommerl import BrdfTable, Lattice, SomManBrdf, builtin
-from sommerl.errors import FormatError
-from sommerl.formats import shader
+from sommerl.formats.shader import source as shader
+from sommerl.system.errors import FormatError
 
 
 def check_like_python(brdf, found):

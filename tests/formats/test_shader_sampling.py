@@ -6,7 +6,7 @@ from helpers import must_fail
 from shader_programs import CASES, compact, material, run
 
 from sommerl import builtin
-from sommerl.formats import shader
+from sommerl.formats.shader import source as shader
 from sommerl.sampling.half_vector import LOWEST, HalfVectorSampler
 
 

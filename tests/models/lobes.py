@@ -6,9 +6,9 @@ from itertools import product
 import numpy as np
 from helpers import random_directions
 
-from sommerl.arrays import split
 from sommerl.models.family import Angles
 from sommerl.models.multi_lobe import FAMILIES
+from sommerl.reflectance.arrays import split
 
 FAMILY_LIST = list(FAMILIES.values())
 

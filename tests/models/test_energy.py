@@ -8,7 +8,6 @@ from helpers import must_fail
 from lobes import FAMILY_LIST, evaluated, label, pairs, scaled, shapes
 from quadrature import albedo, over_directions, over_half_vectors
 
-from sommerl.half_diff import spherical
 from sommerl.models import cook_torrance, ggx, torrance_sparrow
 from sommerl.models.cook_torrance import COOK_TORRANCE
 from sommerl.models.ggx import GGX
@@ -19,6 +18,7 @@ from sommerl.models.phong import PHONG
 from sommerl.models.torrance_sparrow import TORRANCE_SPARROW
 from sommerl.models.ward import WARD
 from sommerl.models.ward_duer import WARD_DUER
+from sommerl.reflectance.half_diff import spherical
 
 ELEVATIONS = np.radians([0, 30, 60, 80, 87, 89, 89.95])
 PLACES = (0.0, 0.15, 0.4, 0.6, 0.8, 1.0)

@@ -8,12 +8,12 @@ from helpers import must_fail
 from lobes import FAMILY_LIST, evaluated, label, scaled
 from quadrature import albedo, radii
 
-from sommerl.half_diff import spherical
 from sommerl.models import cook_torrance, ggx, torrance_sparrow
 from sommerl.models.blinn_phong import BLINN_PHONG
 from sommerl.models.family import Angles
 from sommerl.models.ggx import GGX
 from sommerl.models.phong import PHONG
+from sommerl.reflectance.half_diff import spherical
 
 WIDTHS = (0.002, 0.02, 0.15, 0.5, 1.0)
 GLOSSY = [family for family in FAMILY_LIST if not family.diffuse]

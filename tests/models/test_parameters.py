@@ -7,11 +7,11 @@ import pytest
 from helpers import must_fail
 from lobes import FAMILY_LIST, evaluated, label, pairs, scaled, shapes
 
-from sommerl.arrays import split
-from sommerl.jit import drjit, float64
 from sommerl.models.family import Angles
 from sommerl.models.lafortune import LAFORTUNE
+from sommerl.reflectance.arrays import split
 from sommerl.render.llvm import mitsuba
+from sommerl.system.jit import drjit, float64
 
 WI, WO = pairs()
 ALL_PARAMETERS = [(family, p) for family in FAMILY_LIST for p in family.parameters]

@@ -9,7 +9,7 @@ from helpers import must_fail, random_directions
 from histograms import check_drawn_from, counted, expected, viewer
 
 from sommerl import BrdfTable, Lattice, TrainOptions, builtin, save, train
-from sommerl.arrays import Packed16, gather3, ops
+from sommerl.reflectance.arrays import Packed16, gather3, ops
 from sommerl.render.bsdf import make_bsdf, register, upload
 from sommerl.render.llvm import drjit, mitsuba
 from sommerl.sampling.blinn_phong import BlinnPhongSampler
@@ -234,7 +234,7 @@ def test_scalar_mode_warns_and_gives_the_same():
 import warnings
 import numpy as np
 from sommerl import builtin, BrdfTable, Lattice
-from sommerl import jit
+from sommerl.system import jit
 from sommerl.render import llvm
 jit.find_llvm = lambda: None
 with warnings.catch_warnings(record=True) as caught:

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from helpers import must_fail
 
-from sommerl import container
-from sommerl.errors import OptionError
 from sommerl.render import checkpoint
-from sommerl.render.checkpoint import Checkpoint, Image, State, checkpoint_of
+from sommerl.render.checkpoint import Checkpoint, State, checkpoint_of
+from sommerl.render.frame import Image
+from sommerl.system import sealed_file
+from sommerl.system.errors import OptionError
 
 SHAPE = (2, 3)
 IDENTITY = {"material": "nickel", "scene": "sphere"}
@@ -99,7 +100,7 @@ def test_random_damage(tmp_path):
 
 
 def sealed(head, identity=b'{"material": "nickel", "scene": "sphere"}', rest=b""):
-    return container.sealed(b"SMRP", 1, struct.pack("<IIII", *head) + identity + rest)
+    return sealed_file.sealed(b"SMRP", 1, struct.pack("<IIII", *head) + identity + rest)
 
 
 def test_intact_files_that_hold_what_no_render_writes(tmp_path):
@@ -124,8 +125,8 @@ def test_intact_files_that_hold_what_no_render_writes(tmp_path):
         sealed((2, 0, 0, 0), b"[]"),
         sealed((2, 0, 0, 0), b"\xff\xff"),
         sealed((10**5, 0, 0, 0), b"[" * 10**5),
-        container.sealed(b"SMRP", 2, b"newer"),
-        container.sealed(b"SMRL", 1, b"a material"),
+        sealed_file.sealed(b"SMRP", 2, b"newer"),
+        sealed_file.sealed(b"SMRL", 1, b"a material"),
         b"",
     ):
         check_set_aside(path, content)
@@ -149,10 +150,10 @@ def test_files_that_are_much_too_long(tmp_path, monkeypatch):
     longest = 10 + 16 + 100 + SHAPE[0] * SHAPE[1] * (13 * IMAGES + 24)
     monkeypatch.setattr(checkpoint, "LONGEST_IDENTITY", 100)
     monkeypatch.setattr(checkpoint, "CHUNK", 64)
-    whole = container.sealed(b"SMRP", 1, bytes(5000))
+    whole = sealed_file.sealed(b"SMRP", 1, bytes(5000))
     path.write_bytes(whole)
     kept = Checkpoint(path, IDENTITY, SHAPE, print)
-    assert len(kept._reader(longest).rest()) == longest + 1 - container.PREFIX.size
+    assert len(kept._reader(longest).rest()) == longest + 1 - sealed_file.PREFIX.size
     check_set_aside(path, whole)
     monkeypatch.setattr(checkpoint, "LARGEST_FILE", 4000)
     path.write_bytes(whole)

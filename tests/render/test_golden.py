@@ -13,7 +13,7 @@ from histograms import sidak
 from scipy import stats
 
 from sommerl import builtin
-from sommerl.brdf import Brdf
+from sommerl.reflectance.brdf import Brdf
 from sommerl.render import scenes
 from sommerl.render.environment import LIGHTS, default_environment
 from sommerl.render.llvm import drjit, mitsuba

@@ -1,8 +1,8 @@
 import pytest
 
-from sommerl import jit
-from sommerl.errors import MissingDependencyError
 from sommerl.render import llvm
+from sommerl.system import jit
+from sommerl.system.errors import MissingDependencyError
 
 
 def test_the_one_in_use_is_new_enough():

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from helpers import check_sentence, complaint, must_fail
 
-from sommerl.errors import FormatError
 from sommerl.render import scenes
 from sommerl.render.meshes import knot, lathe, load_mesh, vertex_normals
+from sommerl.system.errors import FormatError
 
 MADE = {"finial": scenes.finial, "bowl": scenes.bowl, "vase": scenes.vase, "knot": lambda: knot("knot")}
 TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)

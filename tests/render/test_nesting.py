@@ -7,7 +7,7 @@ import pytest
 from helpers import must_fail, random_directions
 from kinds import KINDS
 
-from sommerl.arrays import DrjitOps
+from sommerl.reflectance.arrays import DrjitOps
 from sommerl.render.bsdf import make_bsdf
 from sommerl.render.llvm import drjit, mitsuba
 from sommerl.sampling.named import SAMPLERS, fitted

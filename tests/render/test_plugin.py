@@ -5,11 +5,11 @@ import pytest
 from helpers import must_fail, random_directions
 from kinds import KINDS
 
-from sommerl.arrays import DrjitOps
-from sommerl.errors import OptionError
+from sommerl.reflectance.arrays import DrjitOps
 from sommerl.render.bsdf import make_bsdf, register
 from sommerl.render.llvm import drjit, mitsuba
 from sommerl.sampling.named import SAMPLERS, fitted
+from sommerl.system.errors import OptionError
 
 mi, dr = mitsuba(), drjit()
 COUNT = 500

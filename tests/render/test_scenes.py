@@ -5,25 +5,17 @@ import pytest
 from helpers import SMALL, complaint, lambertian_table, must_fail
 
 from sommerl import BrdfTable, TrainOptions, load, save, train
-from sommerl.errors import FormatError
+from sommerl.commands.demo import write_page
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
+from sommerl.plots.contact_sheet import captioned, shortened, tiled
 from sommerl.render import hdr
 from sommerl.render.compare import compare_on_sphere
 from sommerl.render.environment import LIGHTS, default_environment, load_environment
-from sommerl.render.images import (
-    captioned,
-    difference,
-    encode,
-    shortened,
-    side_by_side,
-    signed_difference,
-    tiled,
-    write_image,
-    write_page,
-)
+from sommerl.render.images import difference, encode, side_by_side, signed_difference, write_image
 from sommerl.render.llvm import mitsuba
 from sommerl.render.passes import render
 from sommerl.render.scenes import FILL, sphere
+from sommerl.system.errors import FormatError
 
 WHITE = np.ones((16, 32, 3), np.float32)
 mi = mitsuba()

@@ -5,13 +5,13 @@ import pytest
 from helpers import lambertian_table, must_fail
 
 from sommerl import builtin
-from sommerl.errors import OptionError
 from sommerl.render.environment import default_environment
 from sommerl.render.llvm import mitsuba
 from sommerl.render.meshes import knot
 from sommerl.render.passes import render
 from sommerl.render.scenes import STAGES, stage
 from sommerl.sampling.cosine import CosineSampler
+from sommerl.system.errors import OptionError
 
 mi = mitsuba()
 

@@ -9,11 +9,11 @@ import pytest
 from helpers import must_fail, random_directions
 from kinds import KINDS
 
-from sommerl.errors import MissingDependencyError, OptionError
 from sommerl.render import llvm
 from sommerl.render.bsdf import make_bsdf
 from sommerl.render.llvm import drjit, mitsuba, usable_variants
 from sommerl.sampling.named import SAMPLERS, fitted
+from sommerl.system.errors import MissingDependencyError, OptionError
 
 mi, dr = mitsuba(), drjit()
 VARIANTS = usable_variants()

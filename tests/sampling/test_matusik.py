@@ -7,7 +7,7 @@ import pytest
 from helpers import must_fail
 from sampled import MATERIALS, Dim, sampler
 
-from sommerl.half_diff import spherical
+from sommerl.reflectance.half_diff import spherical
 from sommerl.sampling.matusik import COLUMNS, ELEVATIONS, ROWS, MatusikSampler
 
 STEP = np.pi / 180

@@ -5,7 +5,7 @@ import pytest
 from helpers import must_fail, random_directions
 from sampled import MATERIALS, sampler
 
-from sommerl.arrays import split
+from sommerl.reflectance.arrays import split
 from sommerl.render.bsdf import upload
 from sommerl.render.llvm import mitsuba
 from sommerl.sampling.named import SAMPLERS

@@ -8,8 +8,8 @@ import pytest
 from helpers import random_directions
 
 from sommerl import BrdfTable, load
-from sommerl.brdf import Brdf
 from sommerl.formats import rgl, rgl_export
+from sommerl.reflectance.brdf import Brdf
 from sommerl.render.compare import compare_on_sphere
 from sommerl.render.environment import default_environment
 from sommerl.render.llvm import drjit, mitsuba

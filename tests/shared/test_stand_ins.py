@@ -5,9 +5,9 @@ import statistics
 import pytest
 
 from sommerl import TrainOptions, load_table, train
+from sommerl.compression.smrl.file import encode
 from sommerl.render.compare import compare_on_sphere
 from sommerl.render.environment import default_environment, load_environment
-from sommerl.som_man.file import encode
 
 MATERIALS = (
     "blue-metallic-paint", "yellow-matte-plastic", "nickel", "purple-paint", "green-metallic-paint", "beige-fabric",

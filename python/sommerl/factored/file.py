@@ -1,6 +1,6 @@
 """Files of factored BRDFs (.fbrdf), format 1: docs/format.md has every byte.
 
-The body, after what `container` writes:
+The body, after what `sealed_file` writes:
 
     bytes  what
     1, …   length of the name, and the name in UTF-8
@@ -18,10 +18,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import container, door
-from ..container import Reader
-from ..errors import FormatError, SommerlError
-from ..files import atomic_write
+from ..system import door, sealed_file
+from ..system.errors import FormatError, SommerlError
+from ..system.files import atomic_write
+from ..system.sealed_file import Reader
 from .material import COLUMNS, ELEVATIONS, MOST, ROWS, FactoredBrdf
 
 MAGIC = b"FBRD"
@@ -50,21 +50,21 @@ def load(path: str | Path) -> FactoredBrdf:
 
 def parse(path: Path, data: bytes) -> FactoredBrdf:
     """The same of a file's bytes."""
-    return container.named(path, data, decode)
+    return sealed_file.named(path, data, decode)
 
 
 def encode(material: FactoredBrdf) -> bytes:
     """The bytes of a file. The same material always gives the same bytes."""
     halves = np.concatenate([part.reshape(-1) for part in (material.lobes, material.rows, material.columns)])
     planes = halves.astype("<f2").view(np.uint8).reshape(-1, 2).T
-    stream = container.deflated(planes.tobytes() + material.scale.astype("<f4").tobytes())
-    head = container.origin(material.name, material.source_sha256) + TERMS.pack(*material.terms)
-    return container.sealed(MAGIC, VERSION, head + stream)
+    stream = sealed_file.deflated(planes.tobytes() + material.scale.astype("<f4").tobytes())
+    head = sealed_file.origin(material.name, material.source_sha256) + TERMS.pack(*material.terms)
+    return sealed_file.sealed(MAGIC, VERSION, head + stream)
 
 
 def decode(data: bytes) -> FactoredBrdf:
     """The factored BRDF in the bytes of a file. Raises FormatError."""
-    reader = container.opened(data, MAGIC, VERSION, "factored BRDF (.fbrdf)")
+    reader = sealed_file.opened(data, MAGIC, VERSION, "factored BRDF (.fbrdf)")
     try:
         return _material(reader)
     except FormatError:
@@ -80,7 +80,7 @@ def _material(reader: Reader) -> FactoredBrdf:
         raise FormatError(f"expected 1 to {MOST} lobes and terms, found {lobes} and {terms}")
     shapes = (ELEVATIONS, lobes, 3), (ROWS, lobes, terms), (COLUMNS, lobes, terms)
     sizes = [int(np.prod(shape)) for shape in shapes]
-    payload = container.inflated(reader.rest(), 2 * sum(sizes) + 4 * lobes * terms)
+    payload = sealed_file.inflated(reader.rest(), 2 * sum(sizes) + 4 * lobes * terms)
     planes = np.frombuffer(payload, np.uint8, 2 * sum(sizes)).reshape(2, -1)
     halves = np.ascontiguousarray(planes.T).view("<f2").reshape(-1)
     f, u, v = (part.reshape(shape) for part, shape in zip(np.split(halves, np.cumsum(sizes)[:-1]), shapes, strict=True))

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..brdf import Brdf
-from ..errors import OptionError
-from ..half_diff import spherical
-from ..optional import optional
-from ..origin import source_of
+from ..reflectance.brdf import Brdf
+from ..reflectance.half_diff import spherical
+from ..reflectance.origin import source_of
+from ..system.errors import OptionError
+from ..system.optional import optional
 from .material import COLUMNS, ELEVATIONS, LEAST_COSINE, MOST, MOST_TERMS, PI, ROWS, FactoredBrdf
 
 FIRST_ITERATIONS, ITERATIONS = 200, 100

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, Triple, gather3, ops
-from ..brdf import Brdf, Buffers
-from ..errors import MaterialError
-from ..metrics import asymmetry
+from ..reflectance.arrays import Array, Triple, gather3, ops
+from ..reflectance.brdf import Brdf, Buffers
+from ..reflectance.distance import asymmetry
+from ..system.errors import MaterialError
 
 ELEVATIONS = 32  # intervals of θ_o, equal in angle
 ROWS, COLUMNS = 90, 48  # of θ_h, equal in √θ_h as MERL's bins are; of φ_h, equal in angle over half of the circle
@@ -79,7 +79,7 @@ class FactoredBrdf(Brdf):
 
     @property
     def facts(self) -> dict[str, Any]:
-        """How far from reciprocal it is: see `metrics.asymmetry`."""
+        """How far from reciprocal it is: see `distance.asymmetry`."""
         buffers = self.buffers()
         return {"asymmetry": asymmetry(lambda wi, wo: self.f_r(wi, wo, buffers))}
 

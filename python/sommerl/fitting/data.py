@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..brdf import Brdf, OnLattice
-from ..errors import MaterialError
-from ..formats.scattered import Samples
-from ..half_diff import directions
-from ..lattice import MERL
+from ..reflectance.brdf import Brdf, OnLattice
+from ..reflectance.cells import MERL
+from ..reflectance.half_diff import directions
+from ..reflectance.samples import Samples
+from ..system.errors import MaterialError
 from .options import FitOptions
 
 DARKEST, BRIGHTEST = 1e-15, 1e15  # [1/sr], of what is largest: squares keep their digits between these

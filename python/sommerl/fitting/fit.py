@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from .. import jit
-from ..brdf import Brdf
 from ..models.multi_lobe import MultiLobe
+from ..reflectance.brdf import Brdf
+from ..system import jit
 from .data import samples_of
 from .options import FitOptions, all_models, families_of, family
 from .search import REFINED, Search

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, split
-from ..formats.scattered import Samples
-from ..jit import drjit, float64
 from ..models.family import Angles, Family
-from ..optional import optional
+from ..reflectance.arrays import Array, split
+from ..reflectance.samples import Samples
+from ..system.jit import drjit, float64
+from ..system.optional import optional
 from .options import Loss
 
 Matrix = NDArray[np.float64]

@@ -6,10 +6,10 @@ import difflib
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from ..errors import OptionError
 from ..models.family import Family
 from ..models.lambertian import LAMBERTIAN
 from ..models.multi_lobe import FAMILIES
+from ..system.errors import OptionError
 
 Loss = Literal["l2", "cosine-l2", "log", "cube-root"]
 Sampling = Literal["sphere", "lattice"]

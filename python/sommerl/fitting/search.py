@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..formats.scattered import Samples
 from ..models.family import Family
 from ..models.multi_lobe import Lobe
-from ..optional import optional
+from ..reflectance.samples import Samples
+from ..system.optional import optional
 from .objective import Matrix, Objective
 from .options import FitOptions
 

@@ -12,11 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import door
-from ..errors import FormatError
-from ..table import BrdfTable
-from ..visible import visible
-from .scattered import Samples, to_table
+from ..reflectance.samples import Samples
+from ..reflectance.table import BrdfTable
+from ..system import door
+from ..system.errors import FormatError
+from ..system.visible import visible
+from .scattered import to_table
 from .spectra import srgb_weights
 from .text import LARGEST_FILE, rows, text_of, uncommented
 

@@ -10,11 +10,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
-from .. import door
-from ..errors import FormatError, MaterialError
-from ..files import atomic_write
 from ..models.multi_lobe import FAMILIES, Lobe, MultiLobe
-from ..visible import visible
+from ..system import door
+from ..system.errors import FormatError, MaterialError
+from ..system.files import atomic_write
+from ..system.visible import visible
 
 KEY, VERSION = "sommerl_fits", 1
 LARGEST_FILE = 2**24  # bytes

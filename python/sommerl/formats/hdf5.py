@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import FormatError
-from ..optional import optional
+from ..system.errors import FormatError
+from ..system.optional import optional
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
 DEEPEST, MOST_ITEMS = 8, 512

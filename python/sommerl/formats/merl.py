@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import door
-from ..brdf import Brdf
-from ..errors import FormatError, MaterialError
-from ..files import atomic_write
-from ..lattice import Lattice
-from ..table import BrdfTable
-from ..visible import visible
+from ..reflectance.brdf import Brdf
+from ..reflectance.cells import Lattice
+from ..reflectance.table import BrdfTable
+from ..system import door
+from ..system.errors import FormatError, MaterialError
+from ..system.files import atomic_write
+from ..system.visible import visible
 
 LATTICES: dict[tuple[int, ...], Lattice] = {
     (90, 90, 180): Lattice(),

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import door
-from ..errors import FormatError, MaterialError
 from ..models.nbrdf import SHAPES, WEIGHTS, NeuralBrdf
-from ..visible import visible
+from ..system import door
+from ..system.errors import FormatError, MaterialError
+from ..system.visible import visible
 from . import hdf5
-from .arrays_on_disk import MAGIC, read_npy, read_npz
+from .numpy_files import MAGIC, read_npy, read_npz
 
 ARRAYS = ("fc1", "b1", "fc2", "b2", "fc3", "b3")
 LARGEST_FILE = 2**24  # bytes

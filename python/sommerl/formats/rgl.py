@@ -18,15 +18,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import door
-from ..arrays import Array, Triple, ops
-from ..brdf import Brdf, Buffers
-from ..errors import FormatError
-from ..half_diff import TWO_PI, directions
-from ..lattice import MERL
-from ..metrics import asymmetry
-from ..table import BrdfTable
-from ..visible import visible
+from ..reflectance.arrays import Array, Triple, ops
+from ..reflectance.brdf import Brdf, Buffers
+from ..reflectance.cells import MERL
+from ..reflectance.distance import asymmetry
+from ..reflectance.half_diff import TWO_PI, directions
+from ..reflectance.table import BrdfTable
+from ..system import door
+from ..system.errors import FormatError
+from ..system.visible import visible
 from . import tensor
 from .spectra import srgb_weights
 
@@ -105,7 +105,7 @@ class RglBrdf(Brdf):
         """How far from reciprocal the measurement is; how many of MERL's cells that are not 0 the bound on cosines
         makes smaller; how many have a channel that is negative and taken for 0, and its share of the energy.
 
-        asymmetry: see `metrics.asymmetry`.
+        asymmetry: see `distance.asymmetry`.
         """
         one_sided = asymmetry(lambda wi, wo: self._raw(wi, wo, self._buffers))
         cos_i, cos_o = MERL.cosines()

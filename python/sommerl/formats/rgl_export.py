@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..brdf import Brdf
-from ..errors import MaterialError
-from ..files import atomic_write
-from ..half_diff import directions, spherical
-from ..optional import optional
+from ..reflectance.brdf import Brdf
+from ..reflectance.half_diff import directions, spherical
+from ..system.errors import MaterialError
+from ..system.files import atomic_write
+from ..system.optional import optional
 from . import tensor
 from .rgl import cumulated
 from .spectra import srgb_weights

@@ -16,12 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import door
-from ..errors import FormatError
-from ..table import BrdfTable
-from ..visible import visible
-from . import arrays_on_disk
-from .scattered import Samples, to_table
+from ..reflectance.samples import Samples
+from ..reflectance.table import BrdfTable
+from ..system import door
+from ..system.errors import FormatError
+from ..system.visible import visible
+from . import numpy_files
+from .scattered import to_table
 from .text import LARGEST_FILE, rows, text_of, uncommented
 
 ANGLES = ("theta_i", "phi_i", "theta_o", "phi_o")
@@ -43,15 +44,15 @@ def are_columns(names: Any) -> bool:
 
 def read(path: str | Path) -> BrdfTable:
     """The table of a file of samples. Raises FormatError if it is not one, MissingDependencyError without SciPy."""
-    return parse(Path(path), door.read(path, max(LARGEST_FILE, arrays_on_disk.LARGEST_FILE)))
+    return parse(Path(path), door.read(path, max(LARGEST_FILE, numpy_files.LARGEST_FILE)))
 
 
 def parse(path: Path, data: bytes) -> BrdfTable:
     """The same of a file's bytes."""
-    if data.startswith(arrays_on_disk.MAGIC):
-        columns = _fields(path, arrays_on_disk.read_npy(path, data))
-    elif data.startswith(arrays_on_disk.ZIP_MAGIC):
-        columns = arrays_on_disk.read_npz(path, data)
+    if data.startswith(numpy_files.MAGIC):
+        columns = _fields(path, numpy_files.read_npy(path, data))
+    elif data.startswith(numpy_files.ZIP_MAGIC):
+        columns = numpy_files.read_npz(path, data)
     else:
         columns = _text(path, data)
     try:

@@ -7,21 +7,21 @@ s = sin θ_h sin θ_d, of the value ∛f_r.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Triple, split
-from ..errors import FormatError, MaterialError
-from ..half_diff import directions, half_diff, spherical
-from ..interrupt import undisturbed
-from ..lattice import MERL, Lattice
-from ..metrics import LOG_FLOOR, energy_share
-from ..optional import optional
-from ..table import BrdfTable
-from ..threads import limit
+from ..reflectance.arrays import Triple, split
+from ..reflectance.cells import MERL, Lattice
+from ..reflectance.distance import LOG_FLOOR, energy_share
+from ..reflectance.half_diff import directions, half_diff
+from ..reflectance.samples import Samples
+from ..reflectance.table import BrdfTable
+from ..system.errors import FormatError, MaterialError
+from ..system.interrupt import undisturbed
+from ..system.optional import optional
+from ..system.threads import limit
 
 NEIGHBOURS = 16
 RIDGE = 1e-3  # keeps the planes flat where neighbours leave their slope open
@@ -35,27 +35,6 @@ SAME = 1e-4  # samples whose coordinates agree to that are one, measured several
 IN_PLANE = np.radians(0.5)  # azimuths between 0 and this, or this and π, lie on neither side of the plane of incidence
 MOST_SAMPLES = 2_000_000
 LARGEST = float(np.finfo(np.float32).max)  # that a table holds
-
-
-@dataclass(frozen=True)
-class Samples:
-    """wi, wo: unit directions (n, 3) to light and viewer. f_r: linear RGB [1/sr] (n, 3)."""
-
-    wi: NDArray[np.float64]
-    wo: NDArray[np.float64]
-    f_r: NDArray[np.float64]
-
-    @classmethod
-    def at_angles(cls, angles: NDArray[np.float64], f_r: NDArray[np.float64]) -> Samples:
-        """angles: (n, 4), θ_i, φ_i, θ_o, φ_o [rad]. Raises FormatError if one is not finite."""
-        if not np.isfinite(angles).all():
-            raise FormatError("expected finite angles in every sample, found NaN or infinity")
-        wi, wo = (np.stack(spherical(angles[:, k], angles[:, k + 1]), axis=-1) for k in (0, 2))
-        return cls(wi, wo, f_r)
-
-    def some(self, which: NDArray[Any] | slice) -> Samples:
-        """Those of a mask, of a slice, or with the given numbers."""
-        return Samples(self.wi[which], self.wo[which], self.f_r[which])
 
 
 class ScatteredTable(BrdfTable):

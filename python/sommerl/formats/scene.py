@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any, cast
 from xml.sax.saxutils import quoteattr
 
-from .. import door
-from ..errors import FormatError
-from ..files import atomic_write
-from ..visible import visible
+from ..system import door
+from ..system.errors import FormatError
+from ..system.files import atomic_write
+from ..system.visible import visible
 from .names import split_member
 
 HEAD = """\

@@ -23,7 +23,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import FormatError
+from ..system.errors import FormatError
 
 MAGIC = b"tensor_file\0"
 VERSION = b"\x01\x00"

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import FormatError
+from ..system.errors import FormatError
 
 LARGEST_FILE = 2**28  # bytes
 MOST_LINES = 2**23

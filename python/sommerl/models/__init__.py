@@ -1,0 +1,1 @@
+"""BRDFs by formula, and the built-in ones."""

@@ -7,7 +7,7 @@ that (Kurt & Cinsdikici 2008, after Ngan, Durand & Matusik 2005).
 
 from __future__ import annotations
 
-from ..arrays import Array, ops
+from ..reflectance.arrays import Array, ops
 from .family import PI, Angles, Family, Parameter, cosine_power
 from .microfacets import F0, fresnel
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ..arrays import Array, ops
+from ..reflectance.arrays import Array, ops
 from .family import PI, Angles, Family, Parameter, cosine_power
 
 

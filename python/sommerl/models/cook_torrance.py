@@ -7,7 +7,7 @@ Models", EGSR, and with 4 in place of the printed π in the denominator, which i
 
 from __future__ import annotations
 
-from ..arrays import Array, ops
+from ..reflectance.arrays import Array, ops
 from .family import PI, Angles, Family, exponent_of_width
 from .microfacets import F0, SLOPE, fresnel, grooves
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from ..arrays import Array, Triple, ops
-from ..half_diff import TWO_PI, half_diff
+from ..reflectance.arrays import Array, Triple, ops
+from ..reflectance.half_diff import TWO_PI, half_diff
 
 PI = TWO_PI / 2
 

@@ -6,7 +6,7 @@ G: Heitz 2014, "Understanding the Masking-Shadowing Function in Microfacet-Based
 
 from __future__ import annotations
 
-from ..arrays import Array, ops
+from ..reflectance.arrays import Array, ops
 from .family import PI, Angles, Family, Parameter, exponent_of_width
 from .microfacets import F0, fresnel
 

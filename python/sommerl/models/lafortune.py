@@ -7,7 +7,7 @@ Phong's lobe; below −1 the lobe leans to grazing angles, and above 0 it sends 
 
 from __future__ import annotations
 
-from ..arrays import Array, ops
+from ..reflectance.arrays import Array, ops
 from .family import TWO_PI, Angles, Family, Parameter, cosine_power
 
 

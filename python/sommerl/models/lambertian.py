@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..arrays import Array
+from ..reflectance.arrays import Array
 from .family import PI, Angles, Family
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..arrays import Array, ops
+from ..reflectance.arrays import Array, ops
 from .family import Angles, Parameter
 
 SLOPE = Parameter("m", 0.004, 1.0, 0.15, "logarithmic")  # of the facets: root of the mean square

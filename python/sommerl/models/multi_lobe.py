@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Triple, ops
-from ..brdf import Brdf, Buffers
-from ..errors import MaterialError
+from ..reflectance.arrays import Triple, ops
+from ..reflectance.brdf import Brdf, Buffers
+from ..system.errors import MaterialError
 from .ashikhmin_shirley import ASHIKHMIN_SHIRLEY
 from .blinn_phong import BLINN_PHONG
 from .cook_torrance import COOK_TORRANCE

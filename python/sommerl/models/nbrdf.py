@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Triple, ops
-from ..brdf import Brdf, Buffers
-from ..errors import MaterialError
-from ..half_diff import half_diff
+from ..reflectance.arrays import Triple, ops
+from ..reflectance.brdf import Brdf, Buffers
+from ..reflectance.half_diff import half_diff
+from ..system.errors import MaterialError
 
 SHAPES = ((6, 21), (21, 21), (21, 3))
 WEIGHTS = sum((rows + 1) * columns for rows, columns in SHAPES)

@@ -6,7 +6,7 @@ reflects more than comes in at grazing angles, by 1.5 % at the most.
 
 from __future__ import annotations
 
-from ..arrays import Array, ops
+from ..reflectance.arrays import Array, ops
 from .family import PI, Angles, Family, Parameter
 
 

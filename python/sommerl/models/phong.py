@@ -8,7 +8,7 @@ out and normalise the lobe.
 
 from __future__ import annotations
 
-from ..arrays import Array
+from ..reflectance.arrays import Array
 from .family import TWO_PI, Angles, Family, Parameter, cosine_power
 
 

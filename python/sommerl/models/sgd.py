@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from ..arrays import Array, Triple, ops
-from ..brdf import Brdf, Buffers
-from ..half_diff import TWO_PI, half_diff
+from ..reflectance.arrays import Array, Triple, ops
+from ..reflectance.brdf import Brdf, Buffers
+from ..reflectance.half_diff import TWO_PI, half_diff
 
 PI = TWO_PI / 2
 PARAMETERS = ("rho_d", "rho_s", "alpha", "p", "f0", "f1", "kappa", "lambda", "c", "k", "theta0")

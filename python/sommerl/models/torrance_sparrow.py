@@ -7,7 +7,7 @@ approximation. The factor 1 / (π m²) is exact for small m; for larger ones the
 
 from __future__ import annotations
 
-from ..arrays import Array, ops
+from ..reflectance.arrays import Array, ops
 from .family import PI, Angles, Family, exponent_of_width
 from .microfacets import F0, SLOPE, fresnel, grooves
 

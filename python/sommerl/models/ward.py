@@ -6,7 +6,7 @@ reflects more than comes in from 89.8° on; for narrower lobes, from still close
 
 from __future__ import annotations
 
-from ..arrays import Array, ops
+from ..reflectance.arrays import Array, ops
 from .family import PI, Angles, Family, Parameter, exponent_of_width
 
 ALPHA = Parameter("alpha", 0.004, 1.0, 0.15, "logarithmic")  # the standard deviation of the surface's slope

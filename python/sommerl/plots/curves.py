@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..brdf import Brdf
-from ..errors import MaterialError
-from ..half_diff import directions, spherical
-from ..lattice import HALF_PI, ON_HORIZON
+from ..reflectance.brdf import Brdf
+from ..reflectance.cells import HALF_PI, ON_HORIZON
+from ..reflectance.half_diff import directions, spherical
+from ..system.errors import MaterialError
 from .page import STYLES, THETA_H_TICKS, Materials, colours, legend, matplotlib, named
 
 INCIDENCES = tuple(np.radians((0, 30, 60, 80)).tolist())

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..brdf import Brdf
-from ..half_diff import directions
-from ..lattice import HALF_PI, ON_HORIZON
+from ..reflectance.brdf import Brdf
+from ..reflectance.cells import HALF_PI, ON_HORIZON
+from ..reflectance.half_diff import directions
 from .page import THETA_H_TICKS, number
 from .tone import Tone
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..brdf import Brdf, OnLattice
-from ..errors import MaterialError
-from ..half_diff import TWO_PI, half_diff, spherical
-from ..lattice import HALF_PI, Lattice
+from ..reflectance.brdf import Brdf, OnLattice
+from ..reflectance.cells import HALF_PI, Lattice
+from ..reflectance.half_diff import TWO_PI, half_diff, spherical
+from ..system.errors import MaterialError
 
 THETA_STEPS, PHI_STEPS = 90, 180  # of each direction: 1° and 2°
 

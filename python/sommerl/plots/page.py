@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..brdf import Brdf
-from ..errors import MaterialError, OptionError
-from ..files import atomic_write
-from ..optional import optional
-from ..style import plain_style
-from ..visible import visible
+from ..reflectance.brdf import Brdf
+from ..system.errors import MaterialError, OptionError
+from ..system.files import atomic_write
+from ..system.optional import optional
+from ..system.visible import visible
+from .style import plain_style
 
 Material = tuple[str, Brdf]  #: and its name
 Materials = Brdf | Mapping[str, Brdf]  #: a material, or several by the names that a legend gives them

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..brdf import Brdf
-from ..errors import MaterialError
-from ..som_man.material import SomManBrdf
+from ..compression.material import SomManBrdf
+from ..reflectance.brdf import Brdf
+from ..system.errors import MaterialError
 from .page import number
 from .tone import Tone
 

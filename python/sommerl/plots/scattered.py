@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import split
 from ..formats.scattered import REACH, ScatteredTable
-from ..half_diff import half_diff, spherical
-from ..style import plain_style
+from ..reflectance.arrays import split
+from ..reflectance.half_diff import half_diff, spherical
 from .page import matplotlib, save, text
+from .style import plain_style
 
 INCIDENCES = (10, 45, 75)  # degrees
 

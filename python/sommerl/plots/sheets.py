@@ -6,16 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from ..brdf import Brdf, OnLattice
-from ..errors import OptionError
-from ..lattice import Lattice
-from ..som_man.material import SomManBrdf
-from ..style import plain_style
+from ..compression.material import SomManBrdf
+from ..reflectance.brdf import Brdf, OnLattice
+from ..reflectance.cells import Lattice
+from ..system.errors import OptionError
 from .curves import lobes, theta_h_slices
 from .image_slice import slices
 from .lattice_hits import hits
 from .page import Material, Materials, matplotlib, named, text
 from .palettes import palette, usage
+from .style import plain_style
 from .tone import Tone
 
 PANEL = 4.6, 3.9  # inches

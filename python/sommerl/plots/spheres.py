@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..optional import optional
 from ..render.compare import Comparison
-from ..style import plain_style
+from ..system.optional import optional
 from .page import save, text
+from .style import plain_style
 
 COLUMNS = 6  # of a sheet of spheres
 

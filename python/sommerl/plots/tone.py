@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metrics import to_srgb8
+from ..render.metrics import to_srgb8
 
 DARK, BRIGHT = 25, 99  # percentiles of what is shown
 HEADROOM = 10.0  # white is at least so many times the base: a material without a highlight is a mid grey

@@ -1,0 +1,1 @@
+"""Pictures by Mitsuba, and what is measured on them."""

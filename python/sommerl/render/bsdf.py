@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Packed16, Triple
-from ..brdf import Brdf
-from ..errors import OptionError
 from ..formats import scene
-from ..load import interpolated, load
+from ..formats.load import interpolated, load
+from ..reflectance.arrays import Packed16, Triple
+from ..reflectance.brdf import Brdf
 from ..sampling import named
 from ..sampling.half_vector import albedo_at, albedos
 from ..sampling.sampler import Sampler
+from ..system.errors import OptionError
 from . import colour
 from .llvm import drjit, mitsuba
 

@@ -17,11 +17,12 @@ from typing import Any, BinaryIO, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import container
-from ..brdf import Brdf
-from ..errors import FormatError, OptionError, SommerlError
-from ..files import atomic_write, remove_left_over
-from ..visible import visible
+from ..reflectance.brdf import Brdf
+from ..system import sealed_file
+from ..system.errors import FormatError, OptionError, SommerlError
+from ..system.files import atomic_write, remove_left_over
+from ..system.visible import visible
+from .frame import Image
 
 MAGIC, VERSION = b"SMRP", 1
 HEAD = struct.Struct("<IIII")  # length of the identity, number of images, passes, whether there is a sum of samples
@@ -32,14 +33,6 @@ LONGEST_NAME = 255 - 16  # bytes of a file's: a checkpoint that is set aside has
 SECONDS = 10.0  # of rendering that a kill may cost; what is done sooner is never written
 SHARE = 20  # … and at least that many times as long as writing takes
 PROBES = 1024  # pairs of directions at which a material is looked at
-
-
-@dataclass(frozen=True)
-class Image:
-    """A rendered frame: linear RGB (height, width, 3), and which pixels' centres show an object (height, width)."""
-
-    pixels: NDArray[np.float32]
-    mask: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -54,7 +47,7 @@ class State:
 class Checkpoint:
     """A file that holds a state, and of which render.
 
-    After what `container` writes come HEAD; the identity, JSON in UTF-8; of each image the pixels in single precision
+    After what `sealed_file` writes come HEAD; the identity, JSON in UTF-8; of each image the pixels in single precision
     and a byte a pixel of the mask; and the sum of samples in double precision.
 
     path: see `checkpoint_of`. identity: everything that decides the pixels, by a name that a person understands;
@@ -148,12 +141,12 @@ class Checkpoint:
             parts += [np.ascontiguousarray(image.pixels, "<f4"), np.ascontiguousarray(image.mask, np.uint8)]
         if state.total is not None:
             parts.append(np.ascontiguousarray(state.total, "<f8"))
-        container.write_sealed(out, MAGIC, VERSION, parts)
+        sealed_file.write_sealed(out, MAGIC, VERSION, parts)
 
     def _decoded(self, images: int, passes: int) -> tuple[dict[str, str], State]:
         """The identity in the file, and the state if it is that of this render. Raises FormatError."""
         pixels = self.pixels
-        head = container.PREFIX.size + HEAD.size + LONGEST_IDENTITY
+        head = sealed_file.PREFIX.size + HEAD.size + LONGEST_IDENTITY
         reader = self._reader(head + pixels * (13 * images + 8 * self._channels))
         length, count, done, there = reader.unpack(HEAD)
         found = _identity(reader.take(length))
@@ -173,15 +166,15 @@ class Checkpoint:
             raise FormatError("expected the end of the file, found more")
         return found, State(finished, total, done)
 
-    def _total(self, reader: container.Reader) -> NDArray[np.float64]:
+    def _total(self, reader: sealed_file.Reader) -> NDArray[np.float64]:
         data = reader.take(8 * self._channels * self.pixels)
         return np.frombuffer(data, "<f8").reshape(*self._shape, self._channels)
 
-    def _reader(self, most: int) -> container.Reader:
+    def _reader(self, most: int) -> sealed_file.Reader:
         """A reader of the file, checked as a whole: of as many bytes as this render can have written, and one more."""
         kept, crc, length = bytearray(), 0, 0
         with self.path.open("rb") as file:
-            kept += file.read(container.PREFIX.size)
+            kept += file.read(sealed_file.PREFIX.size)
             while chunk := file.read(CHUNK):
                 crc = zlib.crc32(chunk, crc)
                 kept += chunk[: max(0, most + 1 - len(kept))]
@@ -189,8 +182,8 @@ class Checkpoint:
                 if length > LARGEST_FILE:
                     raise FormatError(f"expected at most {LARGEST_FILE} bytes, found more")
         data = bytes(kept)
-        container.check(crc, data, MAGIC, VERSION, "checkpoint")
-        return container.Reader(data, container.PREFIX.size)
+        sealed_file.check(crc, data, MAGIC, VERSION, "checkpoint")
+        return sealed_file.Reader(data, sealed_file.PREFIX.size)
 
     def _set_aside(self, error: Exception) -> None:
         """Keeps a file that does not serve under another name."""

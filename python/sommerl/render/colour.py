@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Triple, gather3, ops
+from ..reflectance.arrays import Triple, gather3, ops
 from .llvm import mitsuba
 
 LUMINANCE = 0.212671, 0.715160, 0.072169  # of Rec. 709 primaries: Mitsuba's numbers

@@ -9,11 +9,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..brdf import Brdf
-from ..metrics import ImageMetrics, exposure, image_metrics, psnr, to_srgb8
+from ..reflectance.brdf import Brdf
 from ..sampling.half_vector import HalfVectorSampler
-from .checkpoint import Image
+from .frame import Image
 from .images import difference
+from .metrics import ImageMetrics, exposure, image_metrics, psnr, to_srgb8
 from .passes import DEFAULT_SIZE, DEFAULT_SPP, Progress, render, render_all
 from .scenes import sphere
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import door
-from ..errors import FormatError
+from ..system import door
+from ..system.errors import FormatError
 from . import hdr, image_heads
 from .llvm import mitsuba
 

@@ -9,9 +9,9 @@ import warnings
 from functools import cache
 from typing import Any
 
-from .. import jit
-from ..errors import MissingDependencyError, OptionError
-from ..interrupt import undisturbed
+from ..system import jit
+from ..system.errors import MissingDependencyError, OptionError
+from ..system.interrupt import undisturbed
 
 WANTED = f"a GPU, or a libLLVM {jit.OLDEST_LLVM} or newer"
 REMEDY = f"on Linux, install sommerl[render], or set {jit.PATH_VARIABLE}"

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import door
-from ..errors import FormatError
+from ..system import door
+from ..system.errors import FormatError
 from .llvm import mitsuba
 
 LARGEST_FILE = 2**30  # bytes

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import __version__, jit
-from ..interrupt import undisturbed
-from .checkpoint import Checkpoint, Image, State
+from .. import __version__
+from ..system import jit
+from ..system.interrupt import undisturbed
+from .checkpoint import Checkpoint, State
+from .frame import Image, Scene
 from .llvm import drjit, mitsuba
 
 LARGEST_SIZE = 2048  # a pass of one sample a pixel then still fits into 1 GB
@@ -20,14 +20,6 @@ MOST_A_PIXEL = 2**12  # in a pass; from 2^16 on, threads share pixels, and sums 
 DEFAULT_SIZE, DEFAULT_SPP = 256, 256
 
 Progress = Callable[[int, int], None]  #: passes done, passes in all
-
-
-@dataclass(frozen=True)
-class Scene:
-    """A Mitsuba scene, and the names of those of its shapes that carry the materials: its objects."""
-
-    mitsuba: Any
-    objects: tuple[str, ...]
 
 
 def render(scene: Scene, *, spp: int = DEFAULT_SPP, seed: int = 0, progress: Progress | None = None) -> Image:

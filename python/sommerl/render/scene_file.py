@@ -14,16 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import door
-from ..errors import FormatError, OptionError, SommerlError
-from ..files import atomic_write
-from ..interrupt import undisturbed
-from ..metrics import to_srgb8
-from ..visible import visible
+from ..system import door
+from ..system.errors import FormatError, OptionError, SommerlError
+from ..system.files import atomic_write
+from ..system.interrupt import undisturbed
+from ..system.visible import visible
 from .bsdf import register
 from .checkpoint import Checkpoint
 from .images import write_image
 from .llvm import mitsuba
+from .metrics import to_srgb8
 from .passes import Progress, sum_of_passes
 
 LARGEST_FILE = 2**32  # bytes of one that a scene is made of

@@ -11,14 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..brdf import Brdf
-from ..errors import OptionError
+from ..reflectance.brdf import Brdf
 from ..sampling.sampler import Sampler
+from ..system.errors import OptionError
 from .bsdf import make_bsdf
 from .environment import default_environment
+from .frame import Scene
 from .llvm import mitsuba
 from .meshes import Mesh, knot, lathe
-from .passes import DEFAULT_SIZE, Scene
+from .passes import DEFAULT_SIZE
 
 FILL = 0.9  # of the frame's height, by the sphere
 DISTANCE = 5.0  # of the camera, in radii of the sphere

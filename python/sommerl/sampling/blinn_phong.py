@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, Triple, ops
-from ..brdf import Brdf, Buffers
-from ..half_diff import TWO_PI, directions
+from ..reflectance.arrays import Array, Triple, ops
+from ..reflectance.brdf import Brdf, Buffers
+from ..reflectance.half_diff import TWO_PI, directions
 from .sampler import PI, Sampler
 
 SHARPEST = 1e4  # exponents beyond this lose their digits in single precision

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..arrays import Array, Triple, ops
-from ..brdf import Brdf, Buffers
-from ..half_diff import TWO_PI
+from ..reflectance.arrays import Array, Triple, ops
+from ..reflectance.brdf import Brdf, Buffers
+from ..reflectance.half_diff import TWO_PI
 from .sampler import PI, Sampler
 
 

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from ..arrays import Array, Triple, gather3, ops
-from ..brdf import Brdf, Buffers
+from ..reflectance.arrays import Array, Triple, gather3, ops
+from ..reflectance.brdf import Brdf, Buffers
 from .sampler import PI, Sampler
 
 ROWS, COLUMNS = 20, 8  # cells in s and, on one side of the plane of the viewer, in c

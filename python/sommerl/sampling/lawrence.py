@@ -16,8 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, Triple, ops
-from ..brdf import Brdf, Buffers
 from ..factored.fit import FactorOptions, factor
 from ..factored.material import (
     COLUMNS,
@@ -31,7 +29,9 @@ from ..factored.material import (
     half_from_viewer,
     row_of,
 )
-from ..half_diff import TWO_PI
+from ..reflectance.arrays import Array, Triple, ops
+from ..reflectance.brdf import Brdf, Buffers
+from ..reflectance.half_diff import TWO_PI
 from .sampler import PI, Sampler
 from .tables import cumulative, inverted
 

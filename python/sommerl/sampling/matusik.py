@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, Triple, ops
-from ..brdf import Brdf, Buffers
-from ..half_diff import spherical
+from ..reflectance.arrays import Array, Triple, ops
+from ..reflectance.brdf import Brdf, Buffers
+from ..reflectance.half_diff import spherical
 from .sampler import PI, Sampler
 from .tables import cumulative, inverted, probability
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..brdf import Brdf
-from ..errors import OptionError
+from ..reflectance.brdf import Brdf
+from ..system.errors import OptionError
 from .blinn_phong import BlinnPhongSampler
 from .cosine import CosineSampler
 from .half_vector import HalfVectorSampler

@@ -8,8 +8,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Array, Triple, split
-from ..brdf import Brdf, Buffers, finite, told, vectors
+from ..reflectance.arrays import Array, Triple, split
+from ..reflectance.brdf import Brdf, Buffers, finite, told, vectors
 
 PI = np.pi
 UP = np.array([0.0, 0.0, 1.0])  # in the place of directions that are none

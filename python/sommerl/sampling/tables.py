@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, ops
+from ..reflectance.arrays import Array, ops
 
 BELOW_ONE = 1 - 2**-24
 

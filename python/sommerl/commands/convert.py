@@ -1,0 +1,139 @@
+"""The command `convert`: a material in any known format to one that somebody else reads."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..compression.material import SomManBrdf
+from ..compression.paper.options import TrainOptions
+from ..compression.smrl import file as smrl
+from ..formats import merl, rgl_export, scene
+from ..formats.load import load
+from ..formats.scattered import ScatteredTable
+from ..formats.shader import source as shader
+from ..models.builtin import NAMES, builtin_table
+from ..plots import coverage
+from ..reflectance.brdf import Brdf
+from ..reflectance.table import BrdfTable
+from ..system.errors import OptionError
+from . import console
+from .checks import check_output
+from .compress import compress_one, trained
+from .parser import command
+from .rows import UNKNOWN, clamped, clamped_text, fact_rows
+
+EXTENSIONS = {
+    ".smrl": "Sommerl, compressed with the defaults of compress if need be",
+    ".binary": "MERL",
+    ".bsdf": "RGL, for the `measured` materials of Mitsuba and pbrt-v4",
+    **dict.fromkeys(shader.LANGUAGES, "source code with an eval, compressed first if need be"),
+    ".xml": "Mitsuba scene snippet that loads IN",
+    ".json": "the same for load_dict",
+}
+
+SNIPPETS = (".xml", ".json")
+MOSTLY = 0.5
+
+
+def convert(options: Namespace) -> dict[str, Any]:
+    _check(options)
+    brdf = load(options.input) if options.noise is None else builtin_table(options.input, noise=options.noise)
+    output: Path = options.output
+    extension = output.suffix.lower()
+    report = {} if extension in SNIPPETS else _report(brdf, output)
+    if extension == ".smrl" and not isinstance(brdf, SomManBrdf):
+        result = compress_one(BrdfTable.of(brdf), output, TrainOptions(), options.json)
+    else:
+        written = _write(brdf, options, extension)
+        size = output.stat().st_size if output.is_file() else None  # of what went through a pipe
+        counted = UNKNOWN if extension in SNIPPETS else clamped(written)
+        result = {"output": str(output), "bytes_disk": size, **counted}
+        if not options.json:
+            told = f", cells clamped to 0: {clamped_text(counted)}" if counted["cells_clamped"] else ""
+            written_as = "through a pipe" if size is None else console.size(size)
+            console.say(f"{written.name} → {output} ({written_as}{told})")
+    if not options.json:
+        _print_report(report | {"facts": {}} if "epochs" in result else report)
+    return result | report
+
+
+def _check(options: Namespace) -> None:
+    """Raises OptionError for what cannot be asked for."""
+    if options.noise is not None and (options.input not in NAMES or Path(options.input).exists()):
+        raise OptionError(f"noise: expected a built-in material, found {options.input}")
+    if options.noise is not None and options.noise < 0:
+        raise OptionError(f"noise: expected a seed of at least 0, found {options.noise}")
+    extension = options.output.suffix.lower()
+    if options.spectral and extension != ".bsdf":
+        raise OptionError(f"spectral: expected an output that ends in .bsdf, found {options.output}")
+    if extension in SNIPPETS and options.noise is not None:
+        raise OptionError("noise: expected an output that holds the material, found a scene snippet")
+    check_output(options.output, tuple(EXTENSIONS), options.input)
+
+
+def _write(brdf: Brdf, options: Namespace, extension: str) -> Brdf:
+    """Writes a material; returns what it was turned into for that."""
+    output: Path = options.output
+    if isinstance(brdf, SomManBrdf) and extension == ".smrl":
+        smrl.save(brdf, output)
+        return brdf
+    if extension == ".binary":
+        table = merl.resampled(brdf)
+        merl.write(table, output)
+        return table
+    if extension == ".bsdf":
+        rgl_export.write(brdf, output, spectral=options.spectral)
+        return brdf
+    if extension in shader.LANGUAGES:
+        material = brdf if isinstance(brdf, SomManBrdf) else trained(BrdfTable.of(brdf), TrainOptions())[0]
+        shader.write(material, output)
+        return material
+    scene.write(options.input, output)
+    return brdf
+
+
+def _report(brdf: Brdf, output: Path) -> dict[str, Any]:
+    """What the data lacks; and, written before anything else, a picture of where samples were missing."""
+    facts = brdf.facts
+    result: dict[str, Any] = {"facts": facts} if facts else {}
+    if isinstance(brdf, ScatteredTable):
+        result["coverage"] = facts["coverage"]
+        picture = output.with_name(f"{output.stem}.coverage.png")
+        check_output(picture, (".png",))
+        coverage(brdf, picture)
+        result["coverage_image"] = str(picture)
+    return result
+
+
+def _print_report(report: dict[str, Any]) -> None:
+    for name, value in fact_rows(report.get("facts", {})).items():
+        console.say(f"  {name}: {value}")
+    if report.get("coverage", 1) < MOSTLY:
+        console.say("  warning: most of this material is extrapolated")
+    if "coverage_image" in report:
+        console.say(f"  where samples were missing: {report['coverage_image']}")
+
+
+def arguments(add: Any) -> None:
+    """Adds the command to the command line."""
+    summary = "Converts a material into the format that the output's extension names."
+    example = "sommerl convert samples.csv samples.binary\n  sommerl convert nickel.smrl nickel.h"
+    parser = command(add, "convert", convert, summary, example)
+    parser.epilog = f"{_listed(EXTENSIONS)}\n\n{parser.epilog}"
+    parser.add_argument("input", metavar="IN", help="a material: path or built-in name")
+    parser.add_argument("output", type=Path, metavar="OUT", help="a name with one of the extensions below")
+    parser.add_argument(
+        "--spectral", action="store_true", help=".bsdf: spectra for pbrt-v4 and Mitsuba's spectral variants, not RGB"
+    )
+    parser.add_argument(
+        "--noise", type=int, metavar="SEED", help="add the measurement error of MERL's data to a built-in material"
+    )
+
+
+def _listed(extensions: Mapping[str, str]) -> str:
+    """Extensions, and what is written for each; those with one meaning together."""
+    meanings = {text: " ".join(key for key in extensions if extensions[key] == text) for text in extensions.values()}
+    return "Extensions of OUT:\n" + "\n".join(f"  {keys:24}{text}" for text, keys in meanings.items())

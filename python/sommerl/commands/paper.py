@@ -1,0 +1,128 @@
+"""The command `paper`: the paper's tables and figures, written to a folder and shown."""
+
+from __future__ import annotations
+
+import csv
+import io
+from argparse import Namespace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+from ..fitting.options import FitOptions
+from ..reproduction import tables
+from ..system.errors import FormatError
+from ..system.files import atomic_write, check_writable
+from . import console
+from .parser import command
+
+DEFAULTS = FitOptions()
+Rows = Sequence[tables.FitRow] | Sequence[tables.ImageRow]
+
+
+def _table1(data: Path | None, options: FitOptions, picture: Path, progress: tables.Progress | None) -> Rows:
+    return tables.table1(data, options, progress=progress)
+
+
+def _figure5(data: Path | None, options: FitOptions, picture: Path, progress: tables.Progress | None) -> Rows:
+    return tables.figure5(data, picture, options, progress=progress)
+
+
+def _figure6(data: Path | None, options: FitOptions, picture: Path, progress: tables.Progress | None) -> Rows:
+    return tables.figure6(data, picture, options, progress=progress)
+
+
+ITEMS: dict[str, tuple[str, Callable[[Path | None, FitOptions, Path, tables.Progress | None], Rows]]] = {
+    "table1": ("Table 1: errors of two-lobe fits", _table1),
+    "fig5": ("Fig. 5: blue-metallic-paint on a sphere", _figure5),
+    "fig6": ("Fig. 6: errors of three-lobe fits to green-metallic-paint", _figure6),
+}
+
+HEADINGS = {
+    "model": "model",
+    "error": "table",
+    "error_som_man": "M = 1000",
+    "paper": "paper: table",
+    "paper_som_man": "paper: ours",
+    "psnr_frame_db": "PSNR, frame",
+    "psnr_object_db": "PSNR, object",
+    "paper_db": "paper",
+}
+
+
+def paper(options: Namespace) -> dict[str, Any]:
+    """Makes the items asked for. Raises FormatError if there is no such data."""
+    if options.data and not options.data.exists():
+        raise FormatError(f"{options.data}: expected a folder or an archive of materials, found none")
+    options.out.mkdir(parents=True, exist_ok=True)
+    chosen = FitOptions(samples=options.samples, seed=options.seed)
+    result: dict[str, Any] = {}
+    files = {
+        item: [options.out / f"{item}.{extension}" for extension in ("csv", "png")]
+        for item in (ITEMS if options.item == "all" else [options.item])
+    }
+    for path in chain(*files.values()):
+        check_writable(path)
+    for item, (target, picture) in files.items():
+        title, make = ITEMS[item]
+        with console.progress(title) as advance:
+            rows = [asdict(row) for row in make(options.data, chosen, picture, advance)]
+        _write(target, rows)
+        result[item] = rows
+        if not options.json:
+            _show(title, rows)
+            console.say(f"→ {target}", "")
+    return result
+
+
+def _show(title: str, rows: Sequence[dict[str, Any]]) -> None:
+    """On standard output, a table for each material."""
+    for material in dict.fromkeys(row.get("material") for row in rows):
+        shown: list[list[str]] = []
+        for row in rows:
+            if row.get("material") == material:
+                found = [value for key, value in row.items() if key != "material"]
+                shown.append([f"{value:.5g}" if isinstance(value, float) else str(value) for value in found])
+        columns = [HEADINGS[key] for key in rows[0] if key != "material"]
+        console.print_table(f"{title}, {material}" if material else title, columns, shown)
+
+
+def _write(path: Path, rows: Sequence[dict[str, Any]]) -> None:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    with atomic_write(path) as out:
+        out.write(text.getvalue().encode())
+
+
+def arguments(add: Any) -> None:
+    """Adds the command to the command line."""
+    summary = "Makes the paper's tables and figures again, beside the figures that it prints."
+    parser = command(add, "paper", paper, summary, "sommerl paper table1 --data MERL -o paper")
+    listed = "\n".join(f"  {name:8}{title}" for name, (title, _) in ITEMS.items())
+    parser.epilog = f"Items:\n{listed}\n\n{parser.epilog}"
+    parser.add_argument("item", choices=[*ITEMS, "all"], nargs="?", default="all", help="(%(default)s)")
+    parser.add_argument(
+        "--data",
+        type=Path,
+        metavar="DIR",
+        help="a folder with a file for each material, like purple-paint.binary, or an .npz archive of neural BRDFs; "
+        "if not given, the built-in stand-ins",
+    )
+    parser.add_argument(
+        "-o",
+        "--out",
+        type=Path,
+        default=Path("paper"),
+        metavar="DIR",
+        help="folder for tables and pictures (%(default)s)",
+    )
+    for name, text in (
+        ("samples", "pairs of directions that models are fitted to"),
+        ("seed", "of directions and starts"),
+    ):
+        default = getattr(DEFAULTS, name)
+        parser.add_argument(f"--{name}", type=int, default=default, metavar="N", help=f"{text} (%(default)s)")

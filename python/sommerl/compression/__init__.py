@@ -1,0 +1,1 @@
+"""SOM-MAN: a palette that a self-organising map learns, and an index into it."""

@@ -1,0 +1,258 @@
+"""A lattice fitted to a material: where its nodes go, and what they hold.
+
+The places are chosen axis by axis: dynamic programming finds, for each number of nodes, those between which straight
+lines are nearest to the material; a Lagrangian shares out a number of nodes among θ_h and, in bands of θ_h, θ_d and
+φ_d. The values are the weighted least squares of the interpolation to a million directions of the source, drawn toward
+the source's own values where directions are few.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...reflectance.arrays import Triple
+from ...reflectance.brdf import Brdf
+from ...reflectance.half_diff import directions
+from ...reflectance.nodes import ABOVE, BELOW, FINE, KNEE, SMALLEST_COSINE, FittedTable, NodeLattice, angles_at, damped
+from ...system.errors import MaterialError
+from ...system.optional import optional
+from .quantise import Problem
+
+Array = NDArray[np.float64]
+Choices = dict[int, tuple[list[int], float]]  #: for each number of nodes: their places, and the error left
+
+BANDS = 6
+MOST_ROWS, MOST_NODES = 90, 44
+DIRECTIONS = 1_000_000
+LINES = 500  # along which the error of an axis is measured
+RIDGE = 0.05
+MEASURE_POWER = 0.5  # of solid angle times cosines, as a weight: between the sphere's and the cells' own
+SMALLEST, LARGEST = 100, 100_000  # nodes
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """A material at the crossings of three axes of the fine grid: y (h, d, p, 3) and weights (h, d, p)."""
+
+    y: Array
+    weight: Array
+
+
+class Fitter:
+    """A material, prepared for lattices of any size. Raises MissingDependencyError without SciPy."""
+
+    def __init__(self, brdf: Brdf, *, seed: int = 0) -> None:
+        self._brdf = brdf
+        self._sparse, self._solvers = (
+            optional(module, "SciPy", "fitting", "formats") for module in ("scipy.sparse", "scipy.sparse.linalg")
+        )
+        self._random = np.random.Generator(np.random.PCG64(seed))
+        axes = np.arange(FINE + 1.0), np.arange(0.0, FINE + 1, 3.0), np.arange(0.0, FINE, 4.0)
+        wi, wo, f_damped = self._source(*axes)
+        seen = np.minimum(wi[2], wo[2]) > SMALLEST_COSINE
+        values = f_damped[seen]
+        if not values.any():
+            raise MaterialError(f"{brdf.name}: expected a positive reflectance in some direction, found none")
+        # The median; of a mirror, or of one pure colour, that of what is not black. As a file holds it.
+        median = np.median(values) or np.median(values[values > 0])
+        self.scale = float(np.float32(median))
+        grid = self._scaled(*axes, wi, wo, f_damped)
+        self._rows = best_nodes(line_errors(grid.y, grid.weight, 0, self._random), MOST_ROWS)
+        some = self._rows[20][0]
+        starts = sorted({0, *(int(some[len(some) * g // BANDS]) for g in range(1, BANDS))})
+        self._edges = [*starts, FINE + 1]
+        self._theta_d: list[Choices] = []
+        self._phi_d: list[Choices] = []
+        for low, high in zip(self._edges[:-1], self._edges[1:], strict=True):
+            theta_d, phi_d = self._band(low, min(high, FINE))
+            self._theta_d.append(theta_d)
+            self._phi_d.append(phi_d)
+        self._samples()
+
+    def fit(self, nodes: int) -> FittedTable:
+        """The material on so many nodes or a few less. Raises MaterialError for a number out of range."""
+        problem = self.problem(nodes)
+        return FittedTable(problem.lattice, problem.best, self.scale, name=self._brdf.name)
+
+    def problem(self, nodes: int) -> Problem:
+        """The least squares of the material on so many nodes or a few less, solved."""
+        if not SMALLEST <= nodes <= LARGEST:
+            raise MaterialError(f"nodes: expected {SMALLEST} to {LARGEST}, found {nodes}")
+        return self._solved(self._lattice(nodes))
+
+    def _band(self, low: int, high: int) -> tuple[Choices, Choices]:
+        """Nodes in θ_d and in φ_d for the rows from `low` to `high`; errors as those of all rows of the fine grid."""
+        rows = np.unique(np.linspace(low, high, 10).astype(int)).astype(np.float64)
+        thinned = (high - low + 1) / len(rows)
+        grid = self._grid(rows, np.arange(FINE + 1.0), np.arange(0.0, FINE, 9.0))
+        theta_d = best_nodes(thinned * 9 / 12 * line_errors(grid.y, grid.weight, 1, self._random), MOST_NODES)
+        grid = self._grid(rows, np.arange(0.0, FINE + 1, 6.0), np.arange(float(FINE)))
+        y, weight = (np.concatenate([part, part[:, :, :1]], axis=2) for part in (grid.y, grid.weight))
+        found = best_nodes(thinned * 6 / 12 * line_errors(y, weight, 2, self._random), MOST_NODES + 1)
+        return theta_d, {count - 1: (nodes[:-1], error) for count, (nodes, error) in found.items()}
+
+    def _source(self, x: Array, y: Array, z: Array) -> tuple[Triple, Triple, Array]:
+        """Directions at the crossings of axes, and f_r times `damped` there; 0 near and below the horizon."""
+        wi, wo = directions(*angles_at(*np.meshgrid(x, y, z, indexing="ij")))
+        f_r = np.zeros((*wi[0].shape, 3))
+        seen = np.minimum(wi[2], wo[2]) > SMALLEST_COSINE
+        f_r[seen] = self._brdf.eval_both_orders(*(np.stack([c[seen] for c in w], axis=-1) for w in (wi, wo)))
+        return wi, wo, f_r * damped(wi, wo)[..., None]
+
+    def _grid(self, x: Array, y: Array, z: Array) -> _Grid:
+        return self._scaled(x, y, z, *self._source(x, y, z))
+
+    def _scaled(self, x: Array, y: Array, z: Array, wi: Triple, wo: Triple, f_damped: Array) -> _Grid:
+        values = np.cbrt(f_damped / self.scale)
+        seen = np.minimum(wi[2], wo[2]) > SMALLEST_COSINE
+        for j in range(1, len(y)):  # below the horizon, as at the last node above it
+            values[:, j] = np.where(seen[:, j, :, None], values[:, j], values[:, j - 1])
+        return _Grid(values, _measure(*np.meshgrid(x, y, z, indexing="ij"), wi, wo) ** MEASURE_POWER * seen)
+
+    def _samples(self) -> None:
+        """Random directions, evenly over the fine grid, and the source there."""
+        x = (np.arange(DIRECTIONS) + self._random.random(DIRECTIONS)) * (FINE / DIRECTIONS)
+        y, z = self._random.random((2, DIRECTIONS)) * FINE
+        wi, wo = directions(*angles_at(x, y, z))
+        above = np.minimum(wi[2], wo[2]) > 1e-4
+        self._places = x[above], y[above], z[above]
+        wi, wo = ((w[0][above], w[1][above], w[2][above]) for w in (wi, wo))
+        f_r = self._brdf.eval_both_orders(np.stack(wi, axis=-1), np.stack(wo, axis=-1))
+        self._targets = np.cbrt(f_r * (damped(wi, wo) / self.scale)[:, None])
+        weight = _measure(*self._places, wi, wo) ** MEASURE_POWER
+        self._weights = weight / weight.mean()
+
+    def _lattice(self, nodes: int) -> NodeLattice:
+        """Of all numbers of rows, and of nodes in each band's axes, those of the least error at so many nodes."""
+        costs = [
+            _costs(theta_d)[:, None] + _costs(phi_d) for theta_d, phi_d in zip(self._theta_d, self._phi_d, strict=True)
+        ]
+        counts_d, counts_p = (np.arange(1.0, size + 1) for size in costs[0].shape)
+        product: Array = counts_d[:, None] * counts_p
+        best: tuple[float, int, list[tuple[int, int]]] | None = None
+        for rows, (places, error) in self._rows.items():
+            share = np.histogram(places, bins=np.array(self._edges) - 0.5)[0]
+            low, high = -13.0, 3.0
+            for _ in range(20 if rows >= 5 else 0):
+                price = self._rows[5][1] * 10 ** ((low + high) / 2)
+                picked = [
+                    np.unravel_index(int((c + price * n * product).argmin()), c.shape)
+                    for c, n in zip(costs, share, strict=True)
+                ]
+                total = sum(int(n * product[at]) for n, at in zip(share, picked, strict=True))
+                left = error + sum(float(c[at]) for c, n, at in zip(costs, share, picked, strict=True) if n)
+                if 0.8 * nodes <= total <= nodes and (best is None or left < best[0]):
+                    best = left, rows, [(int(i) + 1, int(j) + 1) for i, j in picked]
+                low, high = ((low + high) / 2, high) if total > nodes else (low, (low + high) / 2)
+        if best is None:
+            raise MaterialError(f"{self._brdf.name}: expected a lattice of about {nodes} nodes, found none")
+        _, rows, counts = best
+        places = self._rows[rows][0]
+        bands = [bisect_right(self._edges, place) - 1 for place in places]
+        used = sorted(set(bands))
+        return NodeLattice(
+            tuple(places),
+            tuple(used.index(b) for b in bands),
+            tuple(tuple(self._theta_d[b][counts[b][0]][0]) for b in used),
+            tuple(tuple(self._phi_d[b][counts[b][1]][0]) for b in used),
+        )
+
+    def _solved(self, lattice: NodeLattice) -> Problem:
+        """Least squares of the interpolation at the samples, by conjugate gradients."""
+        corners = lattice.corners(*self._places, lattice.buffers())
+        nodes, weights = (np.stack([corner[k] for corner in corners], axis=-1) for k in (0, 1))
+        count = len(nodes)
+        starts = np.arange(count + 1) * len(corners)
+        matrix = self._sparse.csr_matrix((weights.ravel(), nodes.ravel(), starts), shape=(count, lattice.size))
+        weighted = self._sparse.diags_array(self._weights) @ matrix
+        normal = (weighted.T @ matrix).tocsr()
+        sampled = np.concatenate(
+            [
+                self._grid(
+                    np.array([float(x)]), np.array(lattice.theta_d[b], float), np.array(lattice.phi_d[b], float)
+                ).y.reshape(-1, 3)
+                for x, b in zip(lattice.theta_h, lattice.band, strict=True)
+            ]
+        )
+        diagonal = normal.diagonal()
+        ridge = RIDGE * float(np.median(diagonal[diagonal > 0]))
+        system = normal + self._sparse.diags_array(np.full(lattice.size, ridge))
+        right = weighted.T @ self._targets + ridge * sampled
+        scaled = self._sparse.diags_array(1 / system.diagonal())
+        columns: list[Array] = [
+            self._solvers.cg(system, right[:, c], x0=sampled[:, c], M=scaled, maxiter=200, rtol=1e-5)[0]
+            for c in range(3)
+        ]
+        best = np.stack(columns, axis=-1)
+        error = float((((matrix @ best - self._targets) ** 2) * self._weights[:, None]).sum())
+        return Problem(lattice, system.tocsr(), np.ascontiguousarray(right), best, error)
+
+
+def line_errors(y: Array, weight: Array, axis: int, random: np.random.Generator) -> Array:
+    """What is lost if only two places along an axis are kept and a straight line is drawn between them.
+
+    y: (…, 3) and weights (…) of a grid. Returns (n, n): the weighted squared error at the places between i and j, over
+    the grid's lines along the axis (estimated from LINES of them), infinite unless i < j.
+    """
+    n = int(y.shape[axis])
+    y, weight = np.moveaxis(y, axis, 0).reshape(n, -1, 3), np.moveaxis(weight, axis, 0).reshape(n, -1)
+    lines = np.flatnonzero(weight.sum(axis=0) > 0)
+    chosen = random.permutation(lines)[:LINES]
+    y, weight = y[:, chosen], weight[:, chosen]
+    x = np.arange(n, dtype=np.float64)
+    # Sums over the places before k of w xᵐ, w y xᵐ and w y²: any stretch between two places is then a difference.
+    w = [_before(weight * x[:, None] ** m) for m in (0, 1, 2)]
+    s = [_before(weight[..., None] * y * x[:, None, None] ** m) for m in (0, 1)]
+    q = _before((weight[..., None] * y**2).sum(axis=-1))
+    errors = np.full((n, n), np.inf)
+    for i in range(n - 1):
+        j: NDArray[np.intp] = np.arange(i + 1, n)
+        length = (j - i)[:, None].astype(np.float64)
+        w0, w1, w2 = (part[j] - part[i + 1] for part in w)
+        w1, w2 = (w1 - i * w0) / length, (w2 - 2 * i * w1 + i * i * w0) / length**2
+        s0, s1 = (part[j] - part[i + 1] for part in s)
+        s1 = (s1 - i * s0) / length[..., None]
+        dots = ((s0 - s1) * y[i] + s1 * y[j]).sum(axis=-1)
+        squares = (w0 - 2 * w1 + w2) * (y[i] ** 2).sum(axis=-1) + w2 * (y[j] ** 2).sum(axis=-1)
+        squares += 2 * (w1 - w2) * (y[i] * y[j]).sum(axis=-1)
+        errors[i, i + 1 :] = np.maximum(q[j] - q[i + 1] - 2 * dots + squares, 0.0).sum(axis=1)
+    return errors * (len(lines) / max(1, len(chosen)))
+
+
+def best_nodes(errors: Array, most: int) -> Choices:
+    """For each number of nodes from 2 to `most`, the places from first to last with the least sum of errors."""
+    best = np.full(len(errors), np.inf)
+    best[0] = 0.0
+    before: list[NDArray[np.intp]] = []
+    found: Choices = {}
+    for count in range(2, most + 1):
+        sums = best[:, None] + errors
+        before.append(sums.argmin(axis=0))
+        best = sums.min(axis=0)
+        if np.isfinite(best[-1]):
+            path = [len(errors) - 1]
+            for step in reversed(before):
+                path.append(int(step[path[-1]]))
+            found[count] = path[::-1], float(best[-1])
+    return found
+
+
+def _before(terms: Array) -> Array:
+    return np.concatenate([np.zeros((1, *terms.shape[1:])), np.cumsum(terms, axis=0)])
+
+
+def _costs(choices: Choices) -> Array:
+    """The error left with 1, 2, … nodes; beyond what is known, too large."""
+    return np.array([choices[count][1] if count in choices else 1e30 for count in range(1, MOST_NODES + 1)])
+
+
+def _measure(x: Array, y: Array, z: Array, wi: Triple, wo: Triple) -> Array:
+    """dω_i dω_o cos θ_i cos θ_o of a step of the fine grid, up to a factor."""
+    theta_h, theta_d, _ = angles_at(x, y, z)
+    steps = np.where(x < KNEE, 1 / BELOW, 1 / ABOVE)
+    solid = np.sqrt(theta_h) * np.sin(theta_h) * np.sin(theta_d) * np.cos(theta_d) * steps
+    return solid * np.maximum(wi[2], 0.0) * np.maximum(wo[2], 0.0)

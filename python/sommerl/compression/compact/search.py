@@ -1,0 +1,216 @@
+"""The preset `compact`: chooses lattice, palettes and the price of a bit for a size or for a quality.
+
+What quality means is handed in: the command line gives the PSNR of a rendered sphere. Without it, the error of the
+least squares decides between candidates of one size.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import isfinite
+from operator import index
+
+import numpy as np
+
+from ...reflectance.brdf import Brdf
+from ...reflectance.origin import source_of
+from ...system.errors import MaterialError, OptionError
+from ..material import SomManBrdf
+from ..smrl import file
+from ..smrl.codes import gain_values, shape_values
+from .lattice_fit import LARGEST, SMALLEST, Fitter
+from .quantise import quantise
+
+Quality = Callable[[SomManBrdf], float]  #: of a candidate, in decibels
+Progress = Callable[[int, int], None]  #: steps done, steps in all
+
+DEFAULT_PSNR = 48.0  # dB
+SMALLEST_SIZE, LARGEST_SIZE = 300, 64_000  # bytes
+LOWEST_PSNR, HIGHEST_PSNR = 20.0, 80.0
+SLOPE = 2.4  # dB for each doubling of the size: only a first guess
+CLOSE = 1.04  # sizes nearer to each other than that are not told apart
+MOST_TRIES = 7
+SPREAD = (1.0, 0.8, 1.2)  # of the number of nodes that is usual for a size
+
+# Bytes, and the nodes that are usually best for them.
+USUAL = (
+    (300, 350),
+    (500, 700),
+    (1000, 1450),
+    (2700, 4200),
+    (8000, 12_500),
+    (16_000, 23_000),
+    (32_000, 42_000),
+    (64_000, 75_000),
+)
+GAINS, SHAPES = 3.4, 2.6  # entries for the square root of a node
+MOST_ENTRIES = 1024
+
+
+@dataclass(frozen=True)
+class CompactOptions:
+    """What is asked for: the best material of at most `target_size` bytes, or the smallest of at least `target_psnr`
+    dB; DEFAULT_PSNR if neither is given. seed: of directions, first weights and order.
+
+    Raises OptionError for values that cannot be met by any material.
+    """
+
+    target_size: int | None = None
+    target_psnr: float | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.target_size is not None and self.target_psnr is not None:
+            raise OptionError("target: expected a size or a PSNR, found both")
+        try:
+            object.__setattr__(self, "seed", index(self.seed))
+            if self.target_size is not None:
+                object.__setattr__(self, "target_size", index(self.target_size))
+        except TypeError as error:
+            raise OptionError(f"target_size, seed: expected whole numbers, found others ({error})") from error
+        if self.target_size is not None and not SMALLEST_SIZE <= self.target_size <= LARGEST_SIZE:
+            raise OptionError(f"target_size: expected {SMALLEST_SIZE} to {LARGEST_SIZE}, found {self.target_size}")
+        psnr = self.target_psnr
+        if psnr is not None and not (isfinite(psnr) and LOWEST_PSNR <= psnr <= HIGHEST_PSNR):
+            raise OptionError(f"target_psnr: expected {LOWEST_PSNR:g} to {HIGHEST_PSNR:g}, found {psnr}")
+        if self.target_size is None and psnr is None:
+            object.__setattr__(self, "target_psnr", DEFAULT_PSNR)
+        if not 0 <= self.seed <= 2**64 - 1:
+            raise OptionError(f"seed: expected 0 to {2**64 - 1}, found {self.seed}")
+
+
+@dataclass(frozen=True)
+class CompactReport:
+    """How it went. psnr_db: of the result, None if no quality was handed in. seconds: wall-clock time.
+
+    tried: bytes, nodes, and quality (or minus the error) of each candidate.
+    """
+
+    psnr_db: float | None
+    seconds: float
+    tried: list[tuple[int, int, float]]
+
+
+class Compressor:
+    """A source, prepared once: compact materials of any size or quality.
+
+    quality: what is measured of candidates, and decides between them; without it, the error of the least squares does.
+    step: called after the preparation and after each candidate.
+    Raises MissingDependencyError without SciPy.
+    """
+
+    def __init__(
+        self, brdf: Brdf, *, seed: int = 0, quality: Quality | None = None, step: Callable[[], None] | None = None
+    ) -> None:
+        self.tried: list[tuple[int, int, float]] = []
+        self._brdf, self._seed, self._quality = brdf, seed, quality
+        self._step = step or (lambda: None)
+        self._sha256, self._made_from = source_of(brdf)
+        self._fitter = Fitter(brdf, seed=seed)
+        self._step()
+
+    def of_size(self, size: int) -> tuple[float, SomManBrdf]:
+        """The best of several lattices in at most so many bytes, and its quality.
+
+        Raises MaterialError if none of them is small enough.
+        """
+        best = max((self._candidate(size, spread) for spread in SPREAD), key=lambda each: each[0])
+        if best[0] == -math.inf:
+            least = min(tried[0] for tried in self.tried)
+            raise MaterialError(f"{self._brdf.name}: expected a file of {size} bytes, found none below {least}")
+        return best
+
+    def of_quality(self, wanted: float) -> tuple[float, SomManBrdf]:
+        """The smallest material that is good enough, as far as MOST_TRIES find it. Raises MaterialError if none is."""
+        low, high = float(SMALLEST_SIZE), float(LARGEST_SIZE)
+        size, best, reached = 2000.0, None, -math.inf
+        for tries_left in reversed(range(MOST_TRIES)):
+            quality, material = self._candidate(int(size), 1.0)
+            reached = max(reached, quality)
+            if quality >= wanted:
+                high, best = size, (quality, material)
+            else:
+                low = size
+            if high / low < CLOSE:
+                break
+            guess = size * 2 ** ((wanted - quality + 0.1) / SLOPE)
+            size = min(max(guess, low * (high / low) ** 0.2), low * (high / low) ** 0.8)
+            if best is None and (guess >= LARGEST_SIZE or tries_left == 1):
+                size = float(LARGEST_SIZE)
+        if best is None:
+            found = f"{reached:.1f} dB with {LARGEST_SIZE} bytes"
+            raise MaterialError(f"{self._brdf.name}: expected at least {wanted:g} dB, found no more than {found}")
+        return best
+
+    def _candidate(self, size: int, spread: float) -> tuple[float, SomManBrdf]:
+        """A material of at most so many bytes, with more or fewer nodes than usual; -inf if it is larger."""
+        nodes = int(np.clip(spread * usual_nodes(size), SMALLEST, LARGEST))
+        problem = self._fitter.problem(nodes)
+        gains, shapes = (min(MOST_ENTRIES, round(share * math.sqrt(nodes))) for share in (GAINS, SHAPES))
+        head = file.head_bytes(self._brdf.name, self._sha256, self._made_from)
+        if size < 2 * head:
+            expected = f"a size of at least {2 * head} bytes, twice what its name and source take"
+            raise MaterialError(f"{self._brdf.name}: expected {expected}, found {size}")
+        found, stream = quantise(problem, gains, shapes, size - head, seed=self._seed)
+        material = SomManBrdf(
+            shape_values(found.shapes),
+            found.shape_index,
+            problem.lattice,
+            gains=gain_values(found.gains),
+            gain_index=found.gain_index,
+            scale=self._fitter.scale,
+            name=self._brdf.name,
+            source_sha256=self._sha256,
+            made_from=self._made_from,
+        )
+        error = problem.error + problem.excess(found.values())
+        # Rounded, so that the last bits of a machine's sums do not decide.
+        quality = round(self._quality(material), 3) if self._quality else -error
+        written = head + len(stream)
+        self.tried.append((written, problem.lattice.size, quality))
+        self._step()
+        return (quality if written <= size else -math.inf), material
+
+
+def compress(
+    brdf: Brdf,
+    options: CompactOptions | None = None,
+    *,
+    quality: Quality | None = None,
+    progress: Progress | None = None,
+) -> tuple[SomManBrdf, CompactReport]:
+    """Compresses any BRDF into a compact material.
+
+    quality: what `target_psnr` is about, and how candidates of one size are judged. Raises OptionError if a PSNR is
+    asked for without it, MaterialError if the target cannot be met, MissingDependencyError without SciPy.
+    """
+    options = options or CompactOptions()
+    if options.target_psnr is not None and quality is None:
+        raise OptionError("target_psnr: expected a function that measures it, found none")
+    started = time.perf_counter()
+    steps, done = 1 + (len(SPREAD) if options.target_size is not None else MOST_TRIES), 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        if progress:
+            progress(done, steps)
+
+    compressor = Compressor(brdf, seed=options.seed, quality=quality, step=step)
+    if options.target_psnr is not None:
+        found, material = compressor.of_quality(options.target_psnr)
+    else:
+        found, material = compressor.of_size(options.target_size or LARGEST_SIZE)
+    if progress:
+        progress(steps, steps)
+    seconds = time.perf_counter() - started
+    return material, CompactReport(found if quality else None, seconds, compressor.tried)
+
+
+def usual_nodes(size: int) -> int:
+    """The number of nodes that is usually best for so many bytes."""
+    bytes_, nodes = (np.log(np.array(column, np.float64)) for column in zip(*USUAL, strict=True))
+    return round(float(np.exp(np.interp(math.log(size), bytes_, nodes))))

@@ -1,0 +1,1 @@
+"""The format .smrl: its writer, its reader, and decoders to read and compare."""

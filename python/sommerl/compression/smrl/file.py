@@ -1,0 +1,189 @@
+"""Material files (.smrl), format 1: docs/format.md has every byte, `reference_codec.py` reads nodes in plain Python.
+
+    bytes  what
+    4      "SMRL"
+    2      version, 1
+    4      CRC-32 of all that follows
+    1      kind: 0 for cells (the preset `paper`), 1 for nodes (`compact`)
+    1, …   length of the name, and the name in UTF-8
+    1, …   32 and the SHA-256 of the source, or 0
+    2, …   length of the notes, and notes: JSON in UTF-8, with options and metrics; or 0
+    …      cells: lattice, interpolation, number of LUT entries, and a deflate stream of LUT and indices
+           nodes: scale, and a stream of lattice, palette and indices
+
+All numbers are little-endian.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import _core
+from ...reflectance.cells import INTERPOLATIONS, Lattice
+from ...reflectance.nodes import NodeLattice
+from ...reflectance.origin import Link
+from ...system import door, sealed_file
+from ...system.errors import FormatError, MaterialError, OptionError, SommerlError
+from ...system.files import atomic_write
+from ...system.sealed_file import BYTE, Reader
+from ..material import LARGEST, SomManBrdf
+from . import notes
+from .codes import coordinates, gain_codes, gain_values, shape_codes, shape_values
+
+MAGIC = b"SMRL"
+VERSION = 1
+SHORT = struct.Struct("<H")
+CELLS, NODES = 0, 1
+CELLS_HEAD = struct.Struct("<HHHBBI")
+NODES_HEAD = struct.Struct("<f")
+MOST_BINS = 2**16 - 1  # on an axis
+MOST_CELLS = 2**22  # MERL's larger kind of table has 2,916,000
+LONGEST_FILE = 2 * MOST_CELLS + 24 * 2**16 + 2**20
+LONGEST_NOTES = 2**16 - 1
+
+
+def looks_like(head: bytes) -> bool:
+    """Whether a file that starts with these bytes says that it is a material file."""
+    return head.startswith(MAGIC)
+
+
+def save(material: SomManBrdf, path: str | Path) -> int:
+    """Writes a material file (.smrl); returns its length [bytes].
+
+    Raises FormatError for what `load` would refuse, MaterialError for what is not compressed, OptionError for a name
+    with another extension.
+    """
+    if not isinstance(material, SomManBrdf):  # pyright: ignore[reportUnnecessaryIsInstance]
+        name = getattr(material, "name", "material")
+        raise MaterialError(
+            f"{name}: expected a compressed material, found {type(material).__name__}; sommerl.train makes one of it"
+        )
+    if Path(path).suffix.lower() != ".smrl":
+        raise OptionError(f"{path}: expected a name that ends in .smrl, found {Path(path).suffix!r}")
+    notes.parsed(_noted(material))
+    data = encode(material)
+    with atomic_write(Path(path)) as out:
+        out.write(data)
+    return len(data)
+
+
+def load(path: str | Path) -> SomManBrdf:
+    """The material in a file. Raises FormatError if it is not one, or is damaged, or is of another version."""
+    return parse(Path(path), door.read(path, LONGEST_FILE))
+
+
+def parse(path: Path, data: bytes) -> SomManBrdf:
+    """The same of a file's bytes."""
+    return sealed_file.named(path, data, decode)
+
+
+def encode(material: SomManBrdf) -> bytes:
+    """The bytes of a material file. The same material always gives the same bytes."""
+    noted = _noted(material)
+    nodes = isinstance(material.lattice, NodeLattice)
+    body = _head(NODES if nodes else CELLS, material.name, material.source_sha256, noted)
+    body += _nodes(material) if nodes else _cells(material)
+    return sealed_file.sealed(MAGIC, VERSION, body)
+
+
+def _noted(material: SomManBrdf) -> bytes:
+    return notes.written(made_from=list(material.made_from), metrics=material.metrics, options=material.options)
+
+
+def head_bytes(name: str, source_sha256: str, made_from: Sequence[Link]) -> int:
+    """What a file of nodes holds before the stream [bytes]."""
+    head = _head(NODES, name, source_sha256, notes.written(made_from=list(made_from)))
+    return sealed_file.PREFIX.size + len(head) + NODES_HEAD.size
+
+
+def _head(kind: int, name: str, source_sha256: str, noted: bytes) -> bytes:
+    if len(noted) > LONGEST_NOTES:
+        raise FormatError(f"{name}: expected notes of at most {LONGEST_NOTES} bytes, found {len(noted)}")
+    return BYTE.pack(kind) + sealed_file.origin(name, source_sha256) + SHORT.pack(len(noted)) + noted
+
+
+def decode(data: bytes) -> SomManBrdf:
+    """The material in the bytes of a file. Raises FormatError."""
+    reader = sealed_file.opened(data, MAGIC, VERSION, "material file (.smrl)")
+    try:
+        return _material(reader)
+    except FormatError:
+        raise
+    except (KeyError, TypeError, ValueError, OverflowError, SommerlError) as error:
+        raise FormatError(f"expected a material file's header and contents, found others ({error})") from error
+
+
+def _material(reader: Reader) -> SomManBrdf:
+    (kind,) = reader.unpack(BYTE)
+    if kind not in (CELLS, NODES):
+        raise FormatError(f"expected kind 0 or 1, found {kind}")
+    known: dict[str, Any] = reader.origin()
+    known |= notes.parsed(reader.take(*reader.unpack(SHORT)))
+    return _from_nodes(reader, known) if kind == NODES else _from_cells(reader, known)
+
+
+def _cells(material: SomManBrdf) -> bytes:
+    lattice = material.grid or Lattice()
+    if lattice.size > MOST_CELLS or max(lattice.shape) > MOST_BINS:
+        raise FormatError(f"{material.name}: expected at most {MOST_CELLS} cells, found {lattice.shape}")
+    index = material.index[lattice.above_horizon]
+    payload = material.lut.astype("<f8").tobytes() + index.astype(index.dtype.newbyteorder("<")).tobytes()
+    interpolation = INTERPOLATIONS.index(material.interpolation)
+    head = CELLS_HEAD.pack(*lattice.shape, lattice.reciprocal, interpolation, len(material.lut))
+    return head + sealed_file.deflated(payload)
+
+
+def _from_cells(reader: Reader, known: dict[str, Any]) -> SomManBrdf:
+    theta_h, theta_d, phi_d, reciprocal, interpolation, clusters = map(int, reader.unpack(CELLS_HEAD))
+    size = theta_h * theta_d * phi_d
+    if not 1 <= size <= MOST_CELLS:
+        raise FormatError(f"expected a lattice of 1 to {MOST_CELLS} cells, found {size}")
+    if not 1 <= clusters <= 2**16:
+        raise FormatError(f"expected a LUT of 1 to {2**16} entries, found {clusters}")
+    if reciprocal > 1 or interpolation >= len(INTERPOLATIONS):
+        raise FormatError(f"expected flags of 0 or 1, found {reciprocal} and {interpolation}")
+    lattice = Lattice(theta_h, theta_d, phi_d, bool(reciprocal))
+    above = lattice.above_horizon
+    entry = np.dtype("<u1" if clusters <= 256 else "<u2")
+    payload = sealed_file.inflated(reader.rest(), 24 * clusters + entry.itemsize * int(above.sum()))
+    lut = np.frombuffer(payload, "<f8", 3 * clusters).reshape(clusters, 3)
+    entries = np.frombuffer(payload, entry, offset=24 * clusters)
+    if not ((lut >= 0) & (lut <= LARGEST)).all():
+        raise FormatError("expected LUT entries from 0 to the largest of single precision, found others")
+    if entries.max() >= clusters:
+        raise FormatError(f"expected indices below {clusters}, found {entries.max()}")
+    index: NDArray[Any] = np.zeros(lattice.shape, entry)
+    index[above] = entries
+    return SomManBrdf(lut, index, lattice, interpolation=INTERPOLATIONS[interpolation], **known)
+
+
+def _nodes(material: SomManBrdf) -> bytes:
+    gains, shapes = gain_codes(material.gains), shape_codes(coordinates(material.lut))
+    if not (np.array_equal(gain_values(gains), material.gains) and np.array_equal(shape_values(shapes), material.lut)):
+        raise FormatError(f"{material.name}: expected a palette whose values have codes, found others")
+    assert isinstance(material.lattice, NodeLattice)
+    try:
+        palette = _core.NodePalette(*material.lattice.axes(), gains.tolist(), shapes.tolist())
+        return NODES_HEAD.pack(material.scale) + palette.encode(material.gain_index, material.index)
+    except (ValueError, OverflowError) as error:
+        raise FormatError(f"{material.name}: {error}") from error
+
+
+def _from_nodes(reader: Reader, known: dict[str, Any]) -> SomManBrdf:
+    (scale,) = reader.unpack(NODES_HEAD)
+    if not 0 < scale < np.inf:
+        raise FormatError("expected a positive scale that is finite, found another")
+    try:
+        palette, (gain, shape) = _core.NodePalette.decode(reader.rest())
+    except ValueError as error:
+        raise FormatError(str(error)) from error
+    axes = (tuple(map(tuple, axis)) for axis in (palette.theta_d, palette.phi_d))
+    lattice = NodeLattice(tuple(palette.theta_h), tuple(palette.band), *axes)
+    lut, gains = shape_values(np.array(palette.shapes)), gain_values(np.array(palette.gains))
+    return SomManBrdf(lut, shape, lattice, gains=gains, gain_index=gain, scale=scale, **known)

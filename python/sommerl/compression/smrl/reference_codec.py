@@ -1,0 +1,158 @@
+"""Reads the stream of a compact material's nodes in plain Python: docs/format.md, *Kind 1*. The core is faster."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import accumulate
+
+from ...system.errors import FormatError
+from .reference_model import Model
+
+BOTTOM = 2**24
+EVEN, FULL = 2**11, 2**12  # chances of a bit to be 1: as likely as not, and certain
+RATE = 4
+LONGEST, CONTEXT = 20, 24
+FINE = 180
+MOST_BANDS, MOST_NODES, MOST_ENTRIES = 16, 2**17, 2**10
+HIGHEST_GAIN, WIDEST_SHAPE = 2**12, 2**10
+MOST_REACHED, REACHED_BY_ANY, REACHED_A_BYTE = 2**26, 2**22, 2**11
+
+Axis = list[int]
+Context = list[int]
+Shape = tuple[int, int]
+Lattice = tuple[Axis, list[int], list[Axis], list[Axis]]
+
+
+def decode(
+    data: bytes,
+) -> tuple[Axis, list[int], list[Axis], list[Axis], list[int], list[Shape], list[int], list[int]]:
+    """theta_h, band, theta_d, phi_d, gain_codes, shape_codes, gain_index, shape_index. Raises FormatError."""
+    coder = Decoder(data)
+    theta_h, band, theta_d, phi_d = lattice = _lattice(coder)
+    gains, shapes = _palette(coder)
+    model = Model(lattice, gains, shapes)
+    most = min(MOST_REACHED, REACHED_BY_ANY + REACHED_A_BYTE * len(data))
+    gain_index: list[int] = []
+    shape_index: list[int] = []
+    for row, b in enumerate(band):
+        model.begin(row)
+        for d in range(len(theta_d[b])):
+            for p in range(len(phi_d[b])):
+                model.expect(d, p)
+                gain = coder.pick(model.gain_weights())
+                shape = coder.pick(model.shape_weights())
+                if model.reached > most:
+                    raise FormatError(f"entries within reach: expected at most {most}, found more")
+                model.learn(d, p, gain, shape)
+                gain_index.append(gain)
+                shape_index.append(shape)
+    coder.check_end()
+    return theta_h, band, theta_d, phi_d, gains, shapes, gain_index, shape_index
+
+
+class Decoder:
+    """The range decoder, and whole numbers with adaptive bits."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data, self._read = data, 4
+        self._range, self._code = 2**32 - 1, int.from_bytes(data[:4].ljust(4, b"\0"), "big")
+
+    def pick(self, weights: Sequence[int]) -> int:
+        """One of several symbols, by whole weights of at least 1."""
+        upto = list(accumulate(weights))
+        share = self._range // upto[-1]
+        at = self._code // share
+        if at >= upto[-1]:
+            raise FormatError("stream: expected symbols of the range coder, found a code beyond all of them")
+        symbol = next(i for i, end in enumerate(upto) if end > at)
+        self._code -= share * (upto[symbol] - weights[symbol])
+        self._range = share * weights[symbol]
+        while self._range < BOTTOM:
+            self._range *= 256
+            self._code = 256 * self._code + (self._data[self._read] if self._read < len(self._data) else 0)
+            self._read += 1
+        return symbol
+
+    def bit(self, context: Context, i: int) -> int:
+        """A bit whose chance to be 1, that of a context, learns from it."""
+        one = context[i]
+        bit = self.pick((FULL - one, one))
+        context[i] = one + (FULL - one >> RATE) if bit else one - (one >> RATE)
+        return bit
+
+    def number(self, context: Context) -> int:
+        """A whole number: with 1 added, how many bits it has after the first, one by one; then these."""
+        n = 0
+        while n < LONGEST and self.bit(context, n):
+            n += 1
+        x = 1
+        for i in reversed(range(n)):
+            x = 2 * x + (self.bit(context, LONGEST + i) if i == n - 1 and i < 4 else self.pick((EVEN, EVEN)))
+        return x - 1
+
+    def signed(self, context: Context) -> int:
+        """0, −1, 1, −2, … as 0, 1, 2, 3, …"""
+        x = self.number(context)
+        return -(x + 1) // 2 if x % 2 else x // 2
+
+    def check_end(self) -> None:
+        """Whether this is the one stream that holds what was found."""
+        window = int.from_bytes(self._data.ljust(self._read, b"\0")[self._read - 4 : self._read], "big")
+        low = (window - self._code) % 2**32
+        last = low + self._range - 1
+        roundest = next(cut for k in reversed(range(33)) if (cut := last >> k << k) >= low)
+        if roundest % 2**32 != window or len(self._data) > self._read or self._data[-1:] == b"\0":
+            raise FormatError("expected a stream of nodes that ends with the file, found another")
+
+
+def _bounded(what: str, value: int, least: int, most: int) -> int:
+    if not least <= value <= most:
+        raise FormatError(f"{what}: expected {least} to {most}, found {value}")
+    return value
+
+
+def _contexts() -> list[Context]:
+    return [[EVEN] * CONTEXT for _ in range(4)]
+
+
+def _lattice(coder: Decoder) -> Lattice:
+    counts, *steps = _contexts()
+    bands = _bounded("bands", 1 + coder.number(counts), 1, MOST_BANDS)
+    theta_h = _axis(coder, counts, steps[0], closed=True)
+    band: list[int] = []
+    for b in range(bands):
+        left = len(theta_h) - len(band)
+        rows = left if b + 1 == bands else 1 + coder.number(counts)
+        band += [b] * _bounded("rows of a band", rows, 1, left)
+    theta_d: list[Axis] = []
+    phi_d: list[Axis] = []
+    for _ in range(bands):
+        theta_d.append(_axis(coder, counts, steps[1], closed=True))
+        phi_d.append(_axis(coder, counts, steps[2], closed=False))
+    _bounded("nodes", sum(len(theta_d[b]) * len(phi_d[b]) for b in band), 1, MOST_NODES)
+    return theta_h, band, theta_d, phi_d
+
+
+def _axis(coder: Decoder, counts: Context, steps: Context, *, closed: bool) -> Axis:
+    places = [0]
+    for _ in range(coder.number(counts)):
+        places.append(_bounded("axis", places[-1] + 1 + coder.number(steps), 1, FINE - 1))
+    return places + [FINE] * closed
+
+
+def _palette(coder: Decoder) -> tuple[list[int], list[Shape]]:
+    counts, *steps = _contexts()
+    gains = _bounded("gains", 1 + coder.number(counts), 1, MOST_ENTRIES)
+    shapes = _bounded("shapes", 1 + coder.number(counts), 1, MOST_ENTRIES)
+    gain_codes: list[int] = []
+    code = -1
+    for _ in range(gains):
+        code = _bounded("gain", code + 1 + coder.number(steps[0]), 0, HIGHEST_GAIN - 1)
+        gain_codes.append(code)
+    shape_codes: list[Shape] = []
+    first, second = -WIDEST_SHAPE, 0
+    for _ in range(shapes):
+        first = _bounded("shape", first + coder.number(steps[1]), -WIDEST_SHAPE, WIDEST_SHAPE)
+        second = _bounded("shape", second + coder.signed(steps[2]), -WIDEST_SHAPE, WIDEST_SHAPE)
+        shape_codes.append((first, second))
+    return gain_codes, shape_codes

@@ -1,0 +1,1 @@
+"""Materials as source code: C++, GLSL, HLSL."""

@@ -1,0 +1,1 @@
+"""What a BRDF is, and its forms on cells and nodes."""

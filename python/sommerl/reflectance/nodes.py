@@ -1,0 +1,193 @@
+"""A lattice of nodes in half/difference angles whose places are chosen for one material.
+
+Where `Lattice` has bins of one size, this one has nodes where the material bends. Places are on a fine grid: θ_h in
+steps of √(θ_h / 90°), 1/360 each up to 1/4 and 1/120 each from there, θ_d in 90°/180, φ_d in 180°/180. Rows of equal
+θ_h are gathered in bands; the rows of a band share their nodes in θ_d and φ_d. A lookup blends 8 nodes at most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..system.errors import MaterialError
+from .arrays import Array, Triple, gather3, ops
+from .brdf import Brdf, Buffers
+from .half_diff import TWO_PI, half_diff
+
+FINE = 180  # steps of each axis
+KNEE, BELOW, ABOVE = 90, 360, 120  # steps of √(θ_h / 90°) are 1/BELOW up to number KNEE, 1/ABOVE from there
+SMALLEST_COSINE = 0.01
+HALF_PI = TWO_PI / 4
+
+
+@dataclass(frozen=True)
+class NodeLattice:
+    """theta_h: the rows' numbers on the fine grid, from 0 to FINE. band: of each row. theta_d: for each band, from 0 to
+    FINE. phi_d: for each band, from 0 to less than FINE, of which the first follows upon the last.
+
+    Raises MaterialError for nodes that are not such.
+    """
+
+    theta_h: tuple[int, ...]
+    band: tuple[int, ...]
+    theta_d: tuple[tuple[int, ...], ...]
+    phi_d: tuple[tuple[int, ...], ...]
+
+    def __post_init__(self) -> None:
+        bands = sorted(set(self.band))
+        whole = all(_spans(axis, FINE) for axis in (self.theta_h, *self.theta_d))
+        turns = all(axis and axis[0] == 0 and axis[-1] < FINE and _increases(axis) for axis in self.phi_d)
+        counted = len(self.band) == len(self.theta_h) and bands == list(range(len(self.theta_d)))
+        if not (whole and turns and counted and len(self.theta_d) == len(self.phi_d)):
+            raise MaterialError(f"nodes: expected axes that increase from 0 to {FINE}, and a band for each row")
+
+    @cached_property
+    def base(self) -> NDArray[np.int64]:
+        """The number of the first node of each row; and, last, the number of nodes."""
+        sizes = [len(self.theta_d[b]) * len(self.phi_d[b]) for b in self.band]
+        return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+
+    @property
+    def size(self) -> int:
+        """The number of nodes."""
+        return int(self.base[-1])
+
+    def buffers(self) -> dict[str, NDArray[Any]]:
+        """What `corners` reads: for each step of the fine grid the node below, and the nodes' places."""
+        return {
+            "base": self.base[:-1].astype(np.float64),
+            "band": np.array(self.band, np.uint8),
+            "row_below": _below(self.theta_h),
+            "row_place": np.array(self.theta_h, np.float64),
+            "theta_d_below": np.concatenate([_below(axis) for axis in self.theta_d]),
+            "theta_d_place": _padded(self.theta_d),
+            "phi_d_below": np.concatenate([_below((*axis, FINE)) for axis in self.phi_d]),
+            "phi_d_place": _padded([(*axis, FINE) for axis in self.phi_d]),
+            "phi_d_count": np.array([len(axis) for axis in self.phi_d], np.uint8),
+        }
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """The number of rows, and the most nodes in θ_d and in φ_d that a row has."""
+        return len(self.theta_h), max(map(len, self.theta_d)), max(map(len, self.phi_d))
+
+    def axes(self) -> tuple[list[int], list[int], list[list[int]], list[list[int]]]:
+        """theta_h, band, theta_d, phi_d, as the core takes them."""
+        return list(self.theta_h), list(self.band), [*map(list, self.theta_d)], [*map(list, self.phi_d)]
+
+    def lookup(self, wi: Triple, wo: Triple, fetch: Callable[[Array], Triple], buffers: Buffers) -> Triple:
+        """What `fetch` gives for the nodes about a pair of directions, blended."""
+        (node, weight), *others = self.corners(*place(wi, wo), buffers)
+        x, y, z = (weight * value for value in fetch(node))
+        for node, weight in others:
+            more = fetch(node)
+            x, y, z = x + weight * more[0], y + weight * more[1], z + weight * more[2]
+        return x, y, z
+
+    def corners(self, x: Array, y: Array, z: Array, buffers: Buffers) -> list[tuple[Array, Array]]:
+        """The 8 nodes about a place on the fine grid (θ_h, θ_d, φ_d), and their weights, which add up to 1."""
+        f = ops(x)
+        step = [f.bin(c, FINE) for c in (x, y, z)]
+        row = f.gather(buffers["row_below"], step[0])
+        t = _share(f, buffers["row_place"], row, x)
+        found: list[tuple[Array, Array]] = []
+        for r, weight in ((row, 1.0 - t), (row + 1, t)):
+            band = f.gather(buffers["band"], r)
+            base = f.to_index(f.gather(buffers["base"], r))
+            d = f.gather(buffers["theta_d_below"], band * FINE + step[1])
+            p = f.gather(buffers["phi_d_below"], band * FINE + step[2])
+            u = _share(f, buffers["theta_d_place"], band * (FINE + 1) + d, y)
+            v = _share(f, buffers["phi_d_place"], band * (FINE + 1) + p, z)
+            count = f.gather(buffers["phi_d_count"], band)
+            after = f.where(p + 1 >= count, 0 * p, p + 1)
+            for i, a in ((d, 1.0 - u), (d + 1, u)):
+                found += [(base + i * count + j, weight * a * b) for j, b in ((p, 1.0 - v), (after, v))]
+        return found
+
+
+def place(wi: Triple, wo: Triple) -> Triple:
+    """Where pairs of directions lie on the fine grid."""
+    f = ops(wi[0])
+    theta_h, theta_d, phi_d = half_diff(wi, wo)
+    a = f.sqrt(theta_h * (1 / HALF_PI))
+    x = f.where(a < KNEE / BELOW, a * BELOW, KNEE + (a - KNEE / BELOW) * ABOVE)
+    z = phi_d * (FINE / (2 * HALF_PI))
+    return x, theta_d * (FINE / HALF_PI), f.where(z >= FINE, z - FINE, z)
+
+
+def angles_at(x: Array, y: Array, z: Array) -> Triple:
+    """(θ_h, θ_d, φ_d) [rad] at a place on the fine grid."""
+    f = ops(x)
+    a = f.where(x < KNEE, x / BELOW, KNEE / BELOW + (x - KNEE) / ABOVE)
+    return a * a * HALF_PI, y * (HALF_PI / FINE), z * (2 * HALF_PI / FINE)
+
+
+def damped(wi: Triple, wo: Triple) -> Array:
+    """cos θ_i cos θ_o, neither taken for less than SMALLEST_COSINE: f_r times this stays small near grazing."""
+    f = ops(wi[0])
+    return f.maximum(wi[2], SMALLEST_COSINE) * f.maximum(wo[2], SMALLEST_COSINE)
+
+
+def from_cube_root(y: Triple, wi: Triple, wo: Triple, scale: Array) -> Triple:
+    """f_r of values y in the cube-root domain: scale · max(0, y)³ / `damped`."""
+    f = ops(wi[0])
+    factor = scale / damped(wi, wo)
+
+    def channel(value: Array) -> Array:
+        above = f.maximum(value, 0.0)
+        return above * above * above * factor
+
+    return channel(y[0]), channel(y[1]), channel(y[2])
+
+
+class FittedTable(Brdf):
+    """A material as values on a lattice of its own, in the cube-root domain, not quantised.
+
+    values: y of each node, (nodes.size, 3). Reciprocal by construction. Made by `compression.compact.lattice_fit`.
+    """
+
+    def __init__(self, nodes: NodeLattice, values: NDArray[np.float64], scale: float, *, name: str) -> None:
+        if values.shape != (nodes.size, 3) or not np.isfinite(values).all():
+            raise MaterialError(f"{name}: expected finite values of shape {(nodes.size, 3)}, found {values.shape}")
+        self.nodes, self.values, self.scale, self.name = nodes, values, scale, name
+
+    def buffers(self) -> dict[str, NDArray[Any]]:
+        return self.nodes.buffers() | {"values": self.values.reshape(-1), "scale": np.array(self.scale)}
+
+    def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
+        y = self.nodes.lookup(wi, wo, lambda node: gather3(buffers["values"], node), buffers)
+        return from_cube_root(y, wi, wo, buffers["scale"])
+
+
+def _increases(axis: tuple[int, ...]) -> bool:
+    return all(a < b for a, b in pairwise(axis))
+
+
+def _spans(axis: tuple[int, ...], end: int) -> bool:
+    return len(axis) > 1 and axis[0] == 0 and axis[-1] == end and _increases(axis)
+
+
+def _below(axis: tuple[int, ...]) -> NDArray[np.uint8]:
+    """For each step of the fine grid, the number of the node at or below its start."""
+    return (np.searchsorted(axis, np.arange(FINE), side="right") - 1).astype(np.uint8)
+
+
+def _padded(axes: Any) -> NDArray[np.float64]:
+    """The places of each band's nodes, FINE + 1 entries a band."""
+    places = np.full((len(axes), FINE + 1), float(FINE))
+    for row, axis in zip(places, axes, strict=True):
+        row[: len(axis)] = axis
+    return places.reshape(-1)
+
+
+def _share(f: Any, places: Any, node: Array, x: Array) -> Array:
+    """How far x lies from a node to the next."""
+    a, b = f.gather(places, node), f.gather(places, node + 1)
+    return f.minimum(f.maximum((x - a) / (b - a), 0.0), 1.0)

@@ -1,0 +1,104 @@
+"""BrdfTable: one reflectance for each cell of a lattice."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..system.errors import MaterialError
+from .arrays import Triple, gather3
+from .brdf import Brdf, Buffers, OnLattice
+from .cells import MERL, Interpolation, Lattice, checked
+from .distance import energy_share
+from .half_diff import directions
+from .origin import source_of
+
+
+class BrdfTable(OnLattice):
+    """A measured or sampled isotropic BRDF.
+
+    values: f_r [1/sr], linear RGB, float64, of shape `lattice.shape + (3,)`. Above the horizon, negative and
+        non-finite values of the input become 0 and are counted in `cells_clamped`; cells below the horizon,
+        which hold no measurement, continue the last cell above it (`Lattice.extended`). `energy_clamped` is the share
+        of the energy that they held (`distance.energy_share`), as finite numbers without their sign.
+    interpolation: "trilinear", or "nearest" as in the paper.
+    source_sha256: of the file that the table was read from; of the values where there is none.
+
+    Raises MaterialError if the shape is not the lattice's, or nothing above the horizon is positive.
+    """
+
+    source_facts: Mapping[str, Any] = MappingProxyType({})  #: `facts` of what the table was sampled from
+
+    def __init__(
+        self,
+        values: ArrayLike,
+        lattice: Lattice = MERL,
+        *,
+        name: str = "table",
+        interpolation: Interpolation = "trilinear",
+        source_sha256: str | None = None,
+    ) -> None:
+        f_r = np.asarray(values, np.float64)
+        if f_r.shape != (*lattice.shape, 3):
+            raise MaterialError(f"expected values of shape {(*lattice.shape, 3)}, found {f_r.shape}")
+        self.values: NDArray[np.float64] = lattice.extended(f_r)
+        # Not true, either, of NaN. Renderers calculate in single precision.
+        unusable = ~((self.values >= 0) & (self.values <= np.finfo(np.float32).max))
+        share = energy_share(np.where(unusable, self.values, 0.0), self.values, lattice) if unusable.any() else 0.0
+        self.values[unusable] = 0.0
+        if not (self.values > 0).any():
+            raise MaterialError("expected a positive, finite reflectance above the horizon, found none")
+        self.name = name
+        self.lattice = lattice
+        self.interpolation: Interpolation = checked(interpolation)
+        self.cells_clamped = int(unusable[lattice.above_horizon].any(axis=-1).sum())
+        self.energy_clamped = share
+        self.source_sha256 = source_sha256 or hashlib.sha256(self.values.astype("<f8").tobytes()).hexdigest()
+
+    @classmethod
+    def sample(cls, brdf: Brdf, lattice: Lattice = MERL) -> BrdfTable:
+        """The table of a BRDF's values at the cell centres above the horizon.
+
+        On a reciprocal lattice, the mean of both orders of the directions. What the BRDF itself sets to 0 is counted,
+        too (`Brdf.unclamped`).
+        """
+        above = lattice.above_horizon
+        wi, wo = directions(*(angle[above] for angle in lattice.angles()))
+        values = np.zeros((*lattice.shape, 3))
+        source = brdf.unclamped()
+        found = source.eval_both_orders if lattice.reciprocal else source.eval
+        values[above] = found(np.stack(wi, -1), np.stack(wo, -1))
+        return cls(values, lattice, name=brdf.name)
+
+    @classmethod
+    def of(cls, brdf: Brdf) -> BrdfTable:
+        """The BRDF itself if it is a table; else the table of its cells, or at MERL's cell centres if it has none."""
+        if isinstance(brdf, BrdfTable):
+            return brdf
+        table = cls.sample(brdf, (brdf.grid if isinstance(brdf, OnLattice) else None) or MERL)
+        table.source_facts = brdf.facts
+        sha256, table.made_from = source_of(brdf)
+        table.source_sha256 = sha256 or table.source_sha256
+        return table
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        return dict(self.source_facts)
+
+    @property
+    def grid(self) -> Lattice:
+        return self.lattice
+
+    def cells(self) -> tuple[None, NDArray[np.float64]]:
+        return None, self.values
+
+    def buffers(self) -> dict[str, NDArray[Any]]:
+        return {"values": self.values.reshape(-1)}
+
+    def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
+        return self.lattice.lookup(wi, wo, self.interpolation, lambda cell: gather3(buffers["values"], cell))

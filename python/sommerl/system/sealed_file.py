@@ -1,0 +1,146 @@
+"""What material files of our own share: how they begin, how they say that they are damaged, how their text is stored.
+
+    bytes  what
+    4      magic
+    2      version
+    4      CRC-32 of all that follows
+    …      the body
+
+All numbers are little-endian.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+import zlib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, BinaryIO, Protocol, TypeVar
+
+from .errors import FormatError, SommerlError
+from .visible import visible
+
+PREFIX = struct.Struct("<4sHI")
+BYTE = struct.Struct("<B")
+LONGEST_NAME = 2**8 - 1
+DIGEST_BYTES = 32
+
+
+class Named(Protocol):
+    """What files hold: a material, which has a name, and keeps the SHA-256 of its file."""
+
+    name: str
+    file_sha256: str
+
+
+Material = TypeVar("Material", bound=Named)
+
+
+def sealed(magic: bytes, version: int, body: bytes) -> bytes:
+    """A whole file around its body."""
+    return PREFIX.pack(magic, version, zlib.crc32(body)) + body
+
+
+def write_sealed(out: BinaryIO, magic: bytes, version: int, parts: Sequence[Any]) -> None:
+    """Writes such a file around a body in parts, arrays among them, which are not copied."""
+    crc = 0
+    for part in parts:
+        crc = zlib.crc32(part, crc)
+    out.write(PREFIX.pack(magic, version, crc))
+    for part in parts:
+        out.write(part)
+
+
+def opened(data: bytes, magic: bytes, version: int, kind: str) -> Reader:
+    """A reader of the body. Raises FormatError for another kind of file, another version, or a damaged file."""
+    check(zlib.crc32(memoryview(data)[PREFIX.size :]), data, magic, version, kind)
+    return Reader(data, PREFIX.size)
+
+
+def check(crc: int, data: bytes, magic: bytes, version: int, kind: str) -> None:
+    """Raises FormatError as `opened` does. crc: of what comes after PREFIX, with which data begins."""
+    if len(data) < PREFIX.size:
+        raise FormatError(f"expected at least {PREFIX.size} bytes, found {len(data)}")
+    found_magic, found_version, expected = PREFIX.unpack_from(data)
+    if found_magic != magic:
+        raise FormatError(f"expected a {kind}, found another kind")
+    if found_version != version:
+        hint = "a newer Sommerl may read it" if found_version > version else "make it from its source again"
+        raise FormatError(f"expected version {version}, found version {found_version}; {hint}")
+    if crc != expected:
+        raise FormatError("expected the checksum in the file, found another: the file is damaged or cut off")
+
+
+def named(path: Path, data: bytes, decode: Callable[[bytes], Material]) -> Material:
+    """What `decode` makes of a file's bytes; its errors name the file."""
+    try:
+        material = decode(data)
+    except SommerlError as error:
+        raise FormatError(f"{path}: {error}") from error
+    material.name = visible(material.name)
+    material.file_sha256 = hashlib.sha256(data).hexdigest()
+    return material
+
+
+def origin(name: str, source_sha256: str) -> bytes:
+    """The name in UTF-8 and the SHA-256 of the source, each after its length; a source may have none."""
+    text = name.encode("utf-8", "replace")[:LONGEST_NAME].decode("utf-8", "ignore").encode()
+    try:
+        digest = bytes.fromhex(source_sha256)
+    except ValueError as error:
+        raise FormatError(f"{name}: expected a SHA-256 in hexadecimal digits, found {source_sha256!r}") from error
+    if len(digest) not in (0, DIGEST_BYTES):
+        raise FormatError(f"{name}: expected a digest of {DIGEST_BYTES} bytes, found {len(digest)}")
+    return bytes([len(text)]) + text + bytes([len(digest)]) + digest
+
+
+def deflated(payload: bytes) -> bytes:
+    """A deflate stream (RFC 1951, without zlib's head)."""
+    packer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS, 9)
+    return packer.compress(payload) + packer.flush()
+
+
+def inflated(compressed: bytes, expected: int) -> bytes:
+    """Exactly `expected` bytes, and never more than that in memory. Raises FormatError if that is not what there is."""
+    inflater = zlib.decompressobj(-zlib.MAX_WBITS)
+    try:
+        payload = inflater.decompress(compressed, expected)
+        if len(payload) == expected and not inflater.eof:
+            payload += inflater.decompress(inflater.unconsumed_tail, 1)
+    except zlib.error:
+        payload = b""
+    if len(payload) != expected or not inflater.eof or inflater.unused_data:
+        raise FormatError(f"expected a stream of {expected} bytes, deflated, that ends with the file, found another")
+    return payload
+
+
+class Reader:
+    """Bytes, one part after the other. Raises FormatError where there are too few."""
+
+    def __init__(self, data: bytes, at: int) -> None:
+        self._data, self._at = data, at
+
+    def take(self, count: int) -> bytes:
+        part = self._data[self._at : self._at + count]
+        if len(part) != count:
+            raise FormatError(f"expected {count} more bytes, found {len(part)}")
+        self._at += count
+        return part
+
+    def unpack(self, layout: struct.Struct) -> tuple[Any, ...]:
+        return layout.unpack(self.take(layout.size))
+
+    def origin(self) -> dict[str, str]:
+        """Name and digest, as `origin` wrote them."""
+        try:
+            name = self.take(*self.unpack(BYTE)).decode()
+        except UnicodeDecodeError as error:
+            raise FormatError("expected a name in UTF-8, found other bytes") from error
+        (digest,) = self.unpack(BYTE)
+        if digest not in (0, DIGEST_BYTES):
+            raise FormatError(f"expected a digest of 0 or {DIGEST_BYTES} bytes, found {digest}")
+        return {"name": name, "source_sha256": self.take(digest).hex()}
+
+    def rest(self) -> bytes:
+        return self._data[self._at :]

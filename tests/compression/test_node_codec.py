@@ -1,0 +1,264 @@
+import numpy as np
+import pytest
+from compact import CASES, GOOD, HOSTILE_STREAMS, bomb, broken, material, stream, written
+from helpers import must_fail
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sommerl import _core
+from sommerl.compression.smrl import reference_codec
+from sommerl.compression.smrl.codes import coordinates, gain_codes, shape_codes
+from sommerl.compression.smrl.file import encode
+from sommerl.system.errors import FormatError
+
+
+def core(data, simd=None):
+    """What the core reads, in the form of the reference."""
+    palette, (gain, shape) = _core.NodePalette.decode(data, simd)
+    codes = palette.gains, [tuple(pair) for pair in palette.shapes]
+    return palette.theta_h, palette.band, palette.theta_d, palette.phi_d, *codes, gain.tolist(), shape.tolist()
+
+
+def fields(made):
+    """What a stream of a material has to hold."""
+    codes = gain_codes(made.gains).tolist(), [tuple(pair) for pair in shape_codes(coordinates(made.lut)).tolist()]
+    return *made.lattice.axes(), *codes, made.gain_index.tolist(), made.index.tolist()
+
+
+def palette(made):
+    return _core.NodePalette(*fields(made)[:6])
+
+
+def changed(made):
+    """The same with another gain or shape at the last node."""
+    index = made.gain_index if len(made.gains) > 1 else made.index
+    index[-1] = 0 if index[-1] else 1
+    return made
+
+
+def check_reads(read, data, made):
+    assert read(data) == fields(made)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("case", CASES)
+def test_the_core_and_plain_python_read_what_was_written(case, seed):
+    made = material(case, seed)
+    data, _ = stream(encode(made))
+    for read in (core, reference_codec.decode):
+        check_reads(read, data, made)
+    if case != "minimal":
+        must_fail(check_reads, core, data, changed(material(case, seed)))
+
+
+@pytest.mark.parametrize("bands", range(1, 7))
+def test_bands(bands):
+    made = material((bands, 4, 9, 7, "walk"), bands)
+    data, _ = stream(encode(made))
+    for read in (core, reference_codec.decode):
+        check_reads(read, data, made)
+
+
+def test_all_nodes_that_there_can_be():
+    axes = [*range(63), 180]
+    most = _core.NodePalette([*range(31), 180], [0] * 32, [axes], [[*range(64)]], [7, 900], [[-3, 4], [0, 0], [9, 9]])
+    rng = np.random.default_rng(0)
+    gain, shape = (rng.integers(0, n, 2**17).astype(np.uint16) for n in (2, 3))
+    found, indices = _core.NodePalette.decode(most.encode(gain, shape))
+    assert found.phi_d == most.phi_d
+    assert np.array_equal(indices, (gain, shape))
+    with pytest.raises(ValueError, match="lattice"):
+        _core.NodePalette([*range(32), 180], [0] * 33, [axes], [[*range(64)]], [7], [[0, 0]])
+
+
+def check_same_bytes(made, other):
+    one = palette(made).encode(made.gain_index, made.index, "portable")
+    for simd in _core.simd_paths():
+        assert palette(other).encode(other.gain_index, other.index, simd) == one
+        assert core(one, simd) == fields(made)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_instruction_sets_change_no_bit(case):
+    check_same_bytes(material(case), material(case))
+    if case != "minimal":
+        must_fail(check_same_bytes, material(case), changed(material(case)))
+
+
+def test_an_instruction_set_that_is_none():
+    with pytest.raises(ValueError, match="simd"):
+        core(b"", "abacus")
+
+
+def check_measured(bits, data):
+    assert abs(8 * len(data) - sum(bits)) < 16 + 1e-3 * sum(bits)
+
+
+@pytest.mark.parametrize("case", ["smooth", "noise", "big-palettes", "late"])
+def test_measured_bits_are_those_of_the_stream(case):
+    made = material(case)
+    bits = palette(made).measure(made.gain_index, made.index)
+    data = palette(made).encode(made.gain_index, made.index)
+    check_measured(bits, data)
+    must_fail(check_measured, bits, data + bytes(9))
+
+
+def taken(read, data):
+    """What a reader reads, or what it says if it refuses."""
+    try:
+        return read(data)
+    except (FormatError, ValueError) as error:
+        return str(error)
+
+
+def check_taken_or_refused(data, read=core):
+    """Both readers agree; and a stream that is taken is the only one that holds what is in it."""
+    found = taken(read, data)
+    assert found == taken(reference_codec.decode, data)
+    if not isinstance(found, str):
+        again = _core.NodePalette(*found[:6]).encode(*(np.array(index, np.uint16) for index in found[6:]))
+        assert again == data
+
+
+@pytest.fixture(scope="module")
+def small():
+    return stream(encode(material((2, 1, 3, 3, "walk"), 4)))[0]
+
+
+def careless(data):
+    """Does not mind zeros at the end."""
+    return core(data.rstrip(b"\0"))
+
+
+def test_broken_streams(small):
+    for data in broken(small):
+        check_taken_or_refused(data)
+    must_fail(check_taken_or_refused, small + b"\0", careless)
+
+
+def test_nothing_follows(small):
+    for case in CASES:
+        data = stream(encode(material(case)))[0]
+        for zeros in range(1, 9):
+            assert isinstance(taken(core, data + bytes(zeros)), str)
+        assert isinstance(taken(core, data + b"\xff" * 9), str)
+    for byte in range(256):
+        check_taken_or_refused(small + bytes([byte]))
+        check_taken_or_refused(small[:-1] + bytes([byte]))
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.binary(max_size=60))
+def test_any_bytes(data):
+    check_taken_or_refused(data)
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(0, 2**32), st.integers(1, 5), st.integers(0, 3), st.sampled_from(["walk", "random", "late"]))
+def test_any_material(seed, bands, inner, manner):
+    made = material((bands, inner, 1 + seed % 40, 1 + seed % 33, manner), seed)
+    data, _ = stream(encode(made))
+    for read in (core, reference_codec.decode):
+        check_reads(read, data, made)
+
+
+def complaint_of(read, data):
+    try:
+        read(data)
+    except (FormatError, ValueError) as error:
+        return str(error)
+    return ""
+
+
+def check_refused(data, what):
+    one, other = (complaint_of(read, data) for read in (core, reference_codec.decode))
+    assert f"{what}:" in one
+    assert one == other
+
+
+@pytest.mark.parametrize("name", HOSTILE_STREAMS)
+def test_hostile_numbers(name):
+    check_refused(written(**HOSTILE_STREAMS[name]), name.split("-")[0])
+    must_fail(check_refused, written(palette=GOOD), name.split("-")[0])
+
+
+def test_a_bomb_is_refused():
+    """It does not keep a reader busy: a few bytes may mean no more than some millions of entries within reach."""
+    data = bomb()
+    assert len(data) < 100
+    check_refused(data, "entries within reach")
+    assert complaint_of(core, data).endswith(f"expected at most {2**22 + 2**11 * len(data)}, found more")
+
+
+def any_entries(entries):
+    """As many nodes as there can be, with any of so many gains and shapes."""
+    rng = np.random.default_rng(entries)
+    axes = [*range(31), 180], [0] * 32, [[*range(63), 180]], [[*range(64)]]
+    made = _core.NodePalette(*axes, list(range(entries)), [[i, 0] for i in range(entries)])
+    return made, rng.integers(0, entries, (2, 2**17)).astype(np.uint16)
+
+
+def check_not_too_much(entries):
+    made, indices = any_entries(entries)
+    complaint = complaint_of(lambda each: _core.NodePalette.decode(made.encode(*each)), indices)
+    assert complaint == ""
+
+
+def test_no_more_is_written_than_is_read():
+    check_not_too_much(256)
+    must_fail(check_not_too_much, 257)
+    made, indices = any_entries(300)
+    made.measure(*indices)
+    with pytest.raises(ValueError, match=f"^entries within reach: expected at most {2**26}, found more$"):
+        made.encode(*indices)
+
+
+@pytest.mark.parametrize(
+    ("what", "numbers"),
+    [
+        ("gain", {"palette": GOOD}),
+        ("band", {"bands": 2, "rows": [1], "axes": [[0]] * 4, "palette": GOOD}),
+        ("axis", {"theta_h": [1, 178], "palette": GOOD}),
+        ("nodes", {"theta_h": [30, *[0] * 30], "axes": ([62, *[0] * 62], [63, *[0] * 63])}),
+        ("shape", {"palette": [(0, 0), (2048, 1), (2048, 2)]}),
+        ("shape", {"palette": [(0, 0), (0, 1), (2047, 2)]}),
+    ],
+)
+def test_numbers_at_their_bounds(what, numbers):
+    """Whatever is wrong with the stream, it is not these."""
+    assert what in {name.split("-")[0] for name in HOSTILE_STREAMS}
+    assert f"{what}:" not in complaint_of(core, written(**numbers))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        (1, [0, 2, 0]),  # bands
+        (1, [1, 1, 0]),
+        (0, [0, 90, 90]),
+        (2, [[0, 170], [0, 180]]),
+        (4, []),
+        (4, [4, 4]),
+        (4, [4, 3]),
+        (4, [4096]),
+        (4, list(range(1025))),
+        (5, []),
+        (5, [[0, 0]] * 1025),
+        (5, [[3, 0], [2, 0]]),
+        (5, [[0, 1025]]),
+        (5, [[-1025, 0]]),
+    ],
+)
+def test_palettes_that_cannot_be_written(change):
+    fine = [[0, 30, 180], [0, 1, 1], [[0, 180]] * 2, [[0, 90]] * 2, [1, 2], [[0, 1], [0, 1]]]
+    _core.NodePalette(*fine)
+    fine[change[0]] = change[1]
+    with pytest.raises(ValueError, match=r"^(lattice|palette): expected "):
+        _core.NodePalette(*fine)
+
+
+def test_entries_that_are_none():
+    made = material()
+    for index in (made.index[:-1], np.full_like(made.index, len(made.lut))):
+        with pytest.raises(ValueError, match="an entry of the palette for each node"):
+            palette(made).encode(made.gain_index, index)
