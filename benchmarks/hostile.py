@@ -45,6 +45,7 @@ from sommerl.models.multi_lobe import FAMILIES, Lobe
 from sommerl.models.nbrdf import SHAPES, WEIGHTS
 from sommerl.reflectance.nodes import NodeLattice
 from sommerl.render import checkpoint
+from sommerl.render.frame import Image
 from sommerl.system import door, sealed_file
 from sommerl.system.errors import FormatError, SommerlError
 
@@ -473,7 +474,7 @@ LARGEST_IMAGE = 2**30
 
 def checkpoint_seeds() -> list[bytes]:
     rng = np.random.default_rng(0)
-    image = checkpoint.Image(rng.random((*FRAME, 3)).astype("f4"), rng.random(FRAME) < 0.5)
+    image = Image(rng.random((*FRAME, 3)).astype("f4"), rng.random(FRAME) < 0.5)
     states = checkpoint.State((image,), rng.random((*FRAME, 3)), 2), checkpoint.State((image, image))
     with tempfile.TemporaryDirectory() as folder:
         for number, state in enumerate(states):

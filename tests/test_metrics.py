@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from helpers import SMALL, must_fail
 
+from sommerl.reflectance import distance
 from sommerl.render import metrics
 from sommerl.system.errors import MaterialError
 
@@ -114,18 +115,18 @@ def test_delta_e_itp_of_black_and_white():
 
 def test_table_metrics_by_hand():
     a = np.full((*SMALL.shape, 3), 0.5)
-    found = metrics.table_metrics(a, a * 1.1, SMALL)
+    found = distance.table_metrics(a, a * 1.1, SMALL)
     assert found.rmse == pytest.approx(0.05)
     assert found.relative_error == pytest.approx(0.1)
     assert found.log_error_cosine == pytest.approx(np.log((0.55 + 1e-3) / (0.5 + 1e-3)))
-    same = metrics.table_metrics(a, a, SMALL)
+    same = distance.table_metrics(a, a, SMALL)
     assert (same.rmse, same.relative_error, same.log_error_cosine) == (0, 0, 0)
 
 
 def test_table_metrics_do_not_see_below_the_horizon():
     a = np.full((*SMALL.shape, 3), 0.5)
     b = np.where(SMALL.above_horizon[..., None], a, 9.0)
-    assert metrics.table_metrics(a, b, SMALL).rmse == 0
+    assert distance.table_metrics(a, b, SMALL).rmse == 0
 
 
 def test_the_log_error_weighs_by_cosine_and_solid_angle():
@@ -133,5 +134,5 @@ def test_the_log_error_weighs_by_cosine_and_solid_angle():
     cosine = np.minimum(*SMALL.cosines())
     a = np.full((*SMALL.shape, 3), 0.5)
     grazing, steep = (np.where(cells[..., None], 2 * a, a) for cells in ((cosine > 0) & (cosine < 0.1), cosine > 0.5))
-    errors = [metrics.table_metrics(a, b, SMALL).log_error_cosine for b in (grazing, steep)]
+    errors = [distance.table_metrics(a, b, SMALL).log_error_cosine for b in (grazing, steep)]
     assert errors[0] < errors[1] / 5
