@@ -14,7 +14,7 @@ from sommerl.render.scenes import sphere
 from sommerl.sampling.half_vector import HalfVectorSampler
 from sommerl.sampling.named import OURS, SAMPLERS
 
-SIZE, BLOCK, BATCHES, SPP = 24, 4, 32, 128
+SIZE, BLOCK, BATCHES, SPP = 24, 4, 16, 128
 OTHERS = [kind for kind in SAMPLERS.values() if kind is not OURS]
 MATERIAL = builtin("blue-metallic-paint")
 
