@@ -194,8 +194,8 @@ SHOWN = ("table-trilinear", "table-handed", "cells-nearest", "nodes", "rgl", "ne
 
 
 def samples_of(number):
-    """Three kinds, each with a sampler and in a nesting, for each integrator others: among six integrators, every kind,
-    sampler and nesting is seen twice, some three times. (All of all: benchmarks/nestings.py.)"""
+    """Three kinds, each with a sampler and in a nesting, for each integrator others: the six of them show every kind,
+    sampler and nesting. benchmarks/nestings.py draws from all combinations."""
     for place, kind in enumerate(SHOWN[number % 3 :: 3], 3 * number):
         yield kind, list(SAMPLERS)[place // 2 % len(SAMPLERS)], NESTINGS[list(NESTINGS)[place % len(NESTINGS)]]
 
