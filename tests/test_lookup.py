@@ -26,11 +26,11 @@ MATERIALS = materials()
 
 
 def found(brdf, wi, wo, simd, threads):
-    index, values = brdf.cells()
-    index = None if index is None else index.reshape(-1)
+    buffers = brdf.buffers()
+    index, values = buffers.get("index"), buffers["lut" if brdf.compressed else "values"]
     trilinear = brdf.interpolation == "trilinear"
     shape, reciprocal = brdf.lattice.shape, brdf.lattice.reciprocal
-    prepared = _core.CellLookup(shape, reciprocal, trilinear, values.reshape(-1), index)
+    prepared = _core.CellLookup(shape, reciprocal, trilinear, values, index)
     return prepared.eval(wi, wo, simd, threads)
 
 

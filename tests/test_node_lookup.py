@@ -7,7 +7,8 @@ import pytest
 from helpers import must_fail, random_directions
 
 from sommerl import Brdf, BrdfTable, Lattice, _core
-from sommerl.reflectance.nodes import FINE, FittedTable, NodeLattice
+from sommerl.compression.compact.fitted_table import FittedTable
+from sommerl.reflectance.nodes import FINE, NodeLattice
 
 WIDE = tuple(range(0, FINE + 1, 4))
 SIX = [sorted({0, 180, *range(b + 1, 180, 7 * b + 9)}) for b in range(6)]

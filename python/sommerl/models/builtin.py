@@ -45,7 +45,7 @@ def builtin_table(name: str, *, noise: int | None = None, lattice: Lattice = MER
         near normal incidence and 60-70 % at grazing angles), as a factor common to the channels, log-normal with
         mean 1, σ = 0.12 + 0.5 (1 - cos θ)⁴ for the more grazing direction; None for none.
     """
-    table = BrdfTable.sample(builtin(name), lattice)
+    table = BrdfTable.sampled(builtin(name), lattice)
     if noise is None:
         return table
     cosine = np.clip(np.minimum(*lattice.cosines()), 0, 1)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..reflectance.brdf import Brdf, OnLattice
+from ..reflectance.brdf import Brdf
 from ..reflectance.cells import HALF_PI, Lattice
 from ..reflectance.half_diff import TWO_PI, half_diff, spherical
 from ..system.errors import MaterialError
@@ -40,7 +40,7 @@ def hits(ax: Any, material: Brdf) -> None:
     It depends on the lattice, not on the material. A bar is a row of cells of equal θ_h and θ_d (180 in φ_d, in MERL's
     lattice); the bars add up to all pairs. See `hit_counts`. Raises MaterialError for a material without cells.
     """
-    lattice = material.grid if isinstance(material, OnLattice) else None
+    lattice = material.grid
     if lattice is None:
         raise MaterialError(f"{material.name}: expected a material on a lattice of cells, found one without")
     counts = hit_counts(lattice)

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..reflectance.arrays import Array, Triple, gather3, ops
 from ..reflectance.brdf import Brdf, Buffers
@@ -40,6 +40,7 @@ TINY = 1e-9  # added to lengths along x, so that the azimuth of the normal itsel
 LOWEST = 1e-4  # cos θ_o of the table's lowest elevation, 0 but for numbers that need some width
 DIFFUSE = 0.01  # share of directions that follow the cosine
 FINER = 3  # places looked at along each side of a cell
+EXACT = 8  # the same for a single albedo
 VIEWERS = 31  # elevations that albedos are tabulated for, equal in θ_o
 NEIGHBOUR = 0.07  # a cell gets at least that share of the brightest light in and about it, which bounds weights
 
@@ -103,6 +104,19 @@ class HalfVectorSampler(Sampler):
         # As in `_mirrored`, with the lengths that cancel left out.
         pdf = share * (s * hz) * ((x * x + y * y) * (rim * rim) * (1.0 / 32))
         return f.where(above, pdf, 0.0)
+
+    def albedo(self, theta: ArrayLike) -> NDArray[np.float64]:
+        """The albedo, as `Brdf.albedo` says, from EXACT² places in each cell on either side of the viewer's plane."""
+        angles = np.asarray(theta, np.float64)
+        known = np.isfinite(angles)
+        if ((angles < 0) | (angles > PI / 2)).any():
+            raise ValueError("albedo: expected polar angles from 0 to π/2, found others")
+        found = np.full((angles.size, 3), np.nan)
+        for number in np.flatnonzero(known):
+            cos_o = np.cos(angles.reshape(-1)[number : number + 1])
+            sides = [_light(self.brdf, cos_o, EXACT, side)[0].mean(axis=(0, 1, 2, 3)) for side in (1.0, -1.0)]
+            found[number] = (sides[0] + sides[1]) / 2
+        return found.reshape(*angles.shape, 3)
 
 
 def albedos(brdf: Brdf) -> NDArray[np.float64]:
@@ -181,13 +195,15 @@ def _mirrored(s: Array, c: Array, side: Array, wo: Triple) -> tuple[Triple, Arra
     return wi, 64.0 * (s6 * s) * extent * dot / (cos * round_)
 
 
-def _light(brdf: Brdf, cos_o: NDArray[np.float64], finer: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _light(
+    brdf: Brdf, cos_o: NDArray[np.float64], finer: int, side: float = 1.0
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The light f_r cos θ_i dω_i of places in the unit square, finer² in each cell, and cos θ_i dω_i alone; of shape
-    (elevations, ROWS, COLUMNS, places, channels) and without channels."""
+    (elevations, ROWS, COLUMNS, places, channels) and without channels. side: of the plane of the viewer, 1 or -1."""
     s, c = (((np.arange(finer * n) + 0.5) / (finer * n)) for n in (ROWS, COLUMNS))
     z, s, c = np.broadcast_arrays(cos_o[:, None, None], s[:, None], 2 * c)
     wo = np.sqrt(1 - z * z), np.zeros_like(z), z
-    wi, solid_angle = _mirrored(s, c, np.ones_like(c), wo)
+    wi, solid_angle = _mirrored(s, c, np.full_like(c, side), wo)
     cosine = np.maximum(wi[2], 0.0) * solid_angle
     light = brdf.eval(np.stack(wi, axis=-1), np.stack(wo, axis=-1)) * cosine[..., None]
 
