@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .reflectance.brdf import Brdf
     from .reflectance.cells import MERL, Lattice
     from .reflectance.table import BrdfTable
+    from .render.compress import compress
     from .system.errors import SommerlError
 
 __version__ = "0.1.0"
@@ -36,6 +37,7 @@ __all__ = [
     "TrainReport",
     "builtin",
     "builtin_table",
+    "compress",
     "load",
     "load_table",
     "save",
@@ -55,6 +57,7 @@ _MODULES = {
     "TrainReport": "compression.paper.train",
     "builtin": "models.builtin",
     "builtin_table": "models.builtin",
+    "compress": "render.compress",
     "load": "formats.load",
     "load_table": "formats.load",
     "save": "compression.smrl.file",

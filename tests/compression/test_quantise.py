@@ -244,7 +244,7 @@ def test_one_that_fails_does_not_hold_up_the_others(capsys, tmp_path, monkeypatc
 
     report = search.CompactReport(40.0, 1.0, [])
     monkeypatch.setattr("sommerl.compression.compact.search.compress", only_fabric)
-    monkeypatch.setattr("sommerl.commands.compress.judge_on_sphere", lambda *_: None)
+    monkeypatch.setattr("sommerl.render.compress.judge_on_sphere", lambda *_: None)
     assert main(["compress", "nickel", "red-fabric", "-o", str(tmp_path), "--preset", "compact"]) == 1
     error = capsys.readouterr().err
     assert "nickel (SGD stand-in): out of reach" in error

@@ -7,7 +7,6 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, get_args
 
-from ..compression.compact import search
 from ..compression.compact.search import DEFAULT_PSNR, LARGEST_SIZE, SMALLEST_SIZE, CompactOptions, CompactReport
 from ..compression.material import SomManBrdf
 from ..compression.paper.options import Order, Rule, Topology, TrainOptions
@@ -18,10 +17,8 @@ from ..reflectance.brdf import Brdf
 from ..reflectance.distance import table_metrics
 from ..reflectance.info import Counts
 from ..reflectance.table import BrdfTable
-from ..render.compare import judge_on_sphere
-from ..render.environment import default_environment
-from ..render.llvm import require_compiler
-from ..system.errors import MaterialError, MissingDependencyError, OptionError, SommerlError
+from ..render.compress import compress as compressed
+from ..system.errors import MaterialError, OptionError, SommerlError
 from . import console
 from .checks import check_output, stem
 from .parser import command
@@ -155,7 +152,7 @@ def compress_one(table: BrdfTable, output: Path, options: TrainOptions, quiet: b
 
 def compact_one(brdf: Brdf, output: Path, options: CompactOptions, quiet: bool) -> dict[str, Any]:
     with console.progress(f"compressing {brdf.name}") as advance:
-        material, report = search.compress(brdf, options, quality=_judge(brdf, options), progress=advance)
+        material, report = compressed(brdf, **asdict(options), progress=advance)
     written = smrl.save(material, output)
     result = describe(material, written) | {"options": asdict(options), "psnr_object_db": report.psnr_db}
     counts = brdf.counts
@@ -164,17 +161,6 @@ def compact_one(brdf: Brdf, output: Path, options: CompactOptions, quiet: bool) 
     if not quiet:
         console.print_rows(f"{material.name} → {output}", compact_rows(material, written, report, counts))
     return result
-
-
-def _judge(brdf: Brdf, options: CompactOptions) -> search.Quality | None:
-    """The renderer; without it or a compiler for it, the fit's own error has to do where a size is asked for."""
-    try:
-        require_compiler()
-        return judge_on_sphere(brdf, default_environment())
-    except MissingDependencyError:
-        if options.target_size is None:
-            raise
-        return None
 
 
 def trained(table: BrdfTable, options: TrainOptions) -> tuple[SomManBrdf, TrainReport]:

@@ -40,7 +40,7 @@ TINY = 1e-9  # added to lengths along x, so that the azimuth of the normal itsel
 LOWEST = 1e-4  # cos θ_o of the table's lowest elevation, 0 but for numbers that need some width
 DIFFUSE = 0.01  # share of directions that follow the cosine
 FINER = 3  # places looked at along each side of a cell
-EXACT = 8  # the same for a single albedo
+EXACT = 16  # the same for a single albedo: within 0.1 % where a cell holds no jump
 VIEWERS = 31  # elevations that albedos are tabulated for, equal in θ_o
 NEIGHBOUR = 0.07  # a cell gets at least that share of the brightest light in and about it, which bounds weights
 
