@@ -234,7 +234,7 @@ def test_bad_files_are_refused_by_every_command(capsys, tmp_path, command, name)
     ("arguments", "status", "message"),
     [
         (["info", "blue-metalic-paint"], 1, "did you mean blue-metallic-paint"),
-        (["info", "{}/none.smrl"], 1, "none.smrl: expected a file, found none"),
+        (["info", "{}/none.smrl"], 1, "none.smrl: there is no such file"),
         (["info", "{}"], 1, "found a directory"),
         (["compress", "nickel", "-o", "{}/no/folder/x.smrl"], 1, "there is no folder"),
         (["compress", "nickel", "-o", "{}/x.binary"], 2, "expected a name that ends in .smrl, found '.binary'"),

@@ -59,7 +59,7 @@ def test_materials_of_one_name_are_told_apart(capsys, smrl, tmp_path):
         (["nickel", "-o", "/proc/x.png"], 1, "/proc/x.png: cannot be written"),
         (["nickel"], 2, "required: -o/--output"),
         (["-o", "{}/x.png"], 2, "required: MATERIAL"),
-        (["{}/none.smrl", "-o", "{}/x.png"], 1, "none.smrl: expected a file, found none"),
+        (["{}/none.smrl", "-o", "{}/x.png"], 1, "none.smrl: there is no such file"),
         (["nickle", "-o", "{}/x.png"], 1, "did you mean nickel?"),
         (["nickel", "-o", "{}/x.png", "--kind", "lobe"], 2, "invalid choice: 'lobe' (choose from"),
         (["nickel", "-o", "{}/x.png", "--kind", "palette"], 1, "expected a compressed material, with a palette"),

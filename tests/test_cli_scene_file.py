@@ -317,7 +317,7 @@ def test_mitsuba_warns_on_standard_error_once(capsys, tmp_path, short_passes):
         (None, ["{}/scene.xml", "-D", "width=x"], 1, 'could not parse integer value "x"'),
         (None, ["{}/scene.xml", "-D", "width=1677722"], 1, "film of at most 16777216 pixels, found 1677722 × 10"),
         (None, ["{}/scene.xml", "-D", "material=nickle"], 1, "did you mean nickel"),
-        (None, ["{}/scene.xml", "-D", "material=none.smrl"], 1, "none.smrl: expected a file, found none"),
+        (None, ["{}/scene.xml", "-D", "material=none.smrl"], 1, "none.smrl: there is no such file"),
         (None, ["{}/scene.xml", "-D", "material={}/bad.smrl"], 1, "bad.smrl: expected at least"),
         (
             ("</scene>", ""),

@@ -279,5 +279,5 @@ def test_without_matplotlib(monkeypatch):
         raise ImportError(module)
 
     monkeypatch.setattr(sommerl.system.optional.importlib, "import_module", missing)
-    with pytest.raises(MissingDependencyError, match="plots: expected matplotlib, found none"):
+    with pytest.raises(MissingDependencyError, match="plots: matplotlib is needed and not installed"):
         plots.sheet(PAINT)

@@ -50,7 +50,7 @@ def load(path: str | Path) -> FactoredBrdf:
 
 def parse(path: Path, data: bytes) -> FactoredBrdf:
     """The same of a file's bytes."""
-    return sealed_file.named(path, data, decode)
+    return sealed_file.decode_file(path, data, decode)
 
 
 def encode(material: FactoredBrdf) -> bytes:

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..system import jit
 from ..system.errors import MissingDependencyError, OptionError
-from ..system.interrupt import undisturbed
+from ..system.interrupt import hold_interrupts
 
 WANTED = f"a GPU, or a libLLVM {jit.OLDEST_LLVM} or newer"
 REMEDY = f"on Linux, install sommerl[render], or set {jit.PATH_VARIABLE}"
@@ -29,7 +29,7 @@ def mitsuba(variant: str | None = None) -> Any:
     if variant is not None and variant not in usable_variants():
         raise OptionError(f"variant: expected {' or '.join(usable_variants())}, found {variant}")
     if mi.variant() is None or variant not in (None, mi.variant()):
-        with undisturbed():
+        with hold_interrupts():
             mi.set_variant(variant or _fastest(mi))
             dr = jit.drjit()
             dr.set_thread_count(max(jit.LEAST_THREADS, dr.thread_count()))
@@ -61,7 +61,7 @@ def _check(variant: str) -> None:
 def _module() -> Any:
     if importlib.util.find_spec("mitsuba") is None:
         raise MissingDependencyError("rendering needs Mitsuba: install sommerl[render]")
-    with undisturbed():
+    with hold_interrupts():
         jit.choose_llvm()
         return importlib.import_module("mitsuba")
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .. import __version__
 from ..system import jit
-from ..system.interrupt import undisturbed
+from ..system.interrupt import hold_interrupts
 from .checkpoint import Checkpoint, State
 from .frame import Image, Scene
 from .llvm import drjit, mitsuba
@@ -46,7 +46,7 @@ def render_all(
     state = checkpoint.load(_identity(spp, seed), len(scenes), count) if checkpoint else State()
     try:
         for make in scenes[len(state.images) :]:
-            with undisturbed():
+            with hold_interrupts():
                 scene = make()
             width, height = (int(n) for n in scene.mitsuba.sensors()[0].film().size())
             passes = _passes(spp, width * height)
@@ -60,7 +60,7 @@ def render_all(
                 if progress:
                     progress(before + state.passes, of_all)
             assert state.total is not None
-            with undisturbed():
+            with hold_interrupts():
                 image = Image((state.total / spp).astype(np.float32), _mask(scene, width, height))
                 state = State((*state.images, image))
     except KeyboardInterrupt:
@@ -116,7 +116,7 @@ def _after_each(
     if state.passes:
         yield state
     for number in range(state.passes, len(passes)):
-        with undisturbed(), jit.limited():
+        with hold_interrupts(), jit.limited():
             total = one(passes[number], _seed(seed, number))
         # Not reached after an interruption: of the pass that it came in, Mitsuba may have left out a part.
         state = State(state.images, total if state.total is None else state.total + total, number + 1)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..system import door
 from ..system.errors import FormatError, OptionError, SommerlError
 from ..system.files import atomic_write
-from ..system.interrupt import undisturbed
+from ..system.interrupt import hold_interrupts
 from ..system.visible import visible
 from .bsdf import register
 from .checkpoint import Checkpoint
@@ -67,7 +67,7 @@ def load(path: Path, parameters: Mapping[str, str]) -> OwnScene:
         raise FormatError(f"{path}: expected a scene of Mitsuba's, found no file")
     mi = mitsuba()
     register()
-    with refused(path, "load"), undisturbed():
+    with refused(path, "load"), hold_interrupts():
         # One object after the other: made side by side, lights come in any order, and the same seed draws others.
         found = mi.load_file(str(path), parallel=False, **parameters)
     if not isinstance(found, mi.Scene):
@@ -112,7 +112,7 @@ def render(
         total = sum_of_passes(
             one, spp=spp, seed=seed, pixels=scene.size[0] * scene.size[1], progress=progress, checkpoint=checkpoint
         )
-        with undisturbed():
+        with hold_interrupts():
             # Of particles that are traced from the lights, the film holds no weights: each pass is a mean by itself.
             held = total if weights_of(film, total).any() else total / spp
             film.prepare(integrator.aov_names())
@@ -132,7 +132,7 @@ def channels_of(bitmap: Any) -> list[str]:
 def channels_held(scene: OwnScene) -> int:
     """How many channels the film holds before it is developed, weights among them."""
     film = scene.sensor.film()
-    with refused(scene.path, "render"), undisturbed():
+    with refused(scene.path, "render"), hold_interrupts():
         film.prepare(scene.mitsuba.integrator().aov_names())
         return len(channels_of(film.bitmap(raw=True)))
 
@@ -140,7 +140,7 @@ def channels_held(scene: OwnScene) -> int:
 def check_colours(scene: OwnScene) -> None:
     """Raises FormatError if the film's channels are no colours, which a PNG needs."""
     film = scene.sensor.film()
-    with refused(scene.path, "render"), undisturbed():
+    with refused(scene.path, "render"), hold_interrupts():
         film.prepare(scene.mitsuba.integrator().aov_names())
         bitmap = film.bitmap()
     if _colours(bitmap) is None:

@@ -80,7 +80,7 @@ def load(path: str | Path) -> SomManBrdf:
 
 def parse(path: Path, data: bytes) -> SomManBrdf:
     """The same of a file's bytes."""
-    return sealed_file.named(path, data, decode)
+    return sealed_file.decode_file(path, data, decode)
 
 
 def encode(material: SomManBrdf) -> bytes:
