@@ -79,7 +79,7 @@ def has_llvm(dr: Any) -> bool:
 def found_llvm(dr: Any) -> str:
     """Which LLVM Dr.Jit has loaded, for error messages."""
     active = dr.has_backend(dr.JitBackend.LLVM)
-    return f"libLLVM {dr.detail.llvm_version()[0]}" if active else "none that Dr.Jit takes"
+    return f"libLLVM {dr.detail.llvm_version()[0]}" if active else "none"
 
 
 def choose_llvm() -> None:

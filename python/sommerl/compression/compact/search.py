@@ -1,7 +1,7 @@
-"""The preset `compact`: chooses lattice, palettes and the price of a bit for a size or for a quality.
+"""The preset `compact`: searches for the best material of a given size, or the smallest of a given quality.
 
-What quality means is handed in: the command line gives the PSNR of a rendered sphere. Without it, the error of the
-least squares decides between candidates of one size.
+Quality is measured by a function that the caller passes; the command line passes the PSNR of a rendered sphere. Without
+one, candidates of the same size are compared by their least-squares error.
 """
 
 from __future__ import annotations
@@ -30,7 +30,10 @@ Progress = Callable[[int, int], None]  #: steps done, steps in all
 DEFAULT_PSNR = 48.0  # dB
 SMALLEST_SIZE, LARGEST_SIZE = 300, 64_000  # bytes
 LOWEST_PSNR, HIGHEST_PSNR = 20.0, 80.0
+FIRST_SIZE = 2000.0
 SLOPE = 2.4  # dB for each doubling of the size: only a first guess
+MARGIN = 0.1
+INNER = 0.2, 0.8
 CLOSE = 1.04  # sizes nearer to each other than that are not told apart
 MOST_TRIES = 7
 SPREAD = (1.0, 0.8, 1.2)  # of the number of nodes that is usual for a size
@@ -52,10 +55,11 @@ MOST_ENTRIES = 1024
 
 @dataclass(frozen=True)
 class CompactOptions:
-    """What is asked for: the best material of at most `target_size` bytes, or the smallest of at least `target_psnr`
-    dB; DEFAULT_PSNR if neither is given. seed: of directions, first weights and order.
+    """What to search for: the best material of at most `target_size` bytes, or the smallest of at least `target_psnr`
+    dB. If neither is given, target_psnr is DEFAULT_PSNR.
 
-    Raises OptionError for values that cannot be met by any material.
+    seed: of the random directions, and of the SOM's first weights and order of presentation.
+    Raises OptionError for values out of range, and if both targets are given.
     """
 
     target_size: int | None = None
@@ -64,7 +68,7 @@ class CompactOptions:
 
     def __post_init__(self) -> None:
         if self.target_size is not None and self.target_psnr is not None:
-            raise OptionError("target: expected a size or a PSNR, found both")
+            raise OptionError("target: a size and a PSNR cannot both be asked for; give one of them")
         try:
             object.__setattr__(self, "seed", index(self.seed))
             if self.target_size is not None:
@@ -84,9 +88,10 @@ class CompactOptions:
 
 @dataclass(frozen=True)
 class CompactReport:
-    """How it went. psnr_db: of the result, None if no quality was handed in. seconds: wall-clock time.
+    """How the search went.
 
-    tried: bytes, nodes, and quality (or minus the error) of each candidate.
+    psnr_db: the quality of the result; None if no quality function was passed. seconds: wall-clock time.
+    tried: for each candidate its bytes, its nodes, and its quality [dB] (or minus its error).
     """
 
     psnr_db: float | None
@@ -95,9 +100,9 @@ class CompactReport:
 
 
 class Compressor:
-    """A source, prepared once: compact materials of any size or quality.
+    """Prepares a source once, and then makes compact materials of any size or quality from it.
 
-    quality: what is measured of candidates, and decides between them; without it, the error of the least squares does.
+    quality: gives a candidate's quality [dB]; if None, minus the least-squares error is used.
     step: called after the preparation and after each candidate.
     Raises MissingDependencyError without SciPy.
     """
@@ -113,7 +118,7 @@ class Compressor:
         self._step()
 
     def of_size(self, size: int) -> tuple[float, SomManBrdf]:
-        """The best of several lattices in at most so many bytes, and its quality.
+        """The best material of at most `size` bytes among one for each of SPREAD, and its quality.
 
         Raises MaterialError if none of them is small enough.
         """
@@ -124,9 +129,12 @@ class Compressor:
         return best
 
     def of_quality(self, wanted: float) -> tuple[float, SomManBrdf]:
-        """The smallest material that is good enough, as far as MOST_TRIES find it. Raises MaterialError if none is."""
+        """The smallest material of at least the quality `wanted` [dB] that MOST_TRIES candidates find, and its quality.
+
+        Raises MaterialError if none of them is good enough.
+        """
         low, high = float(SMALLEST_SIZE), float(LARGEST_SIZE)
-        size, best, reached = 2000.0, None, -math.inf
+        size, best, reached = FIRST_SIZE, None, -math.inf
         for tries_left in reversed(range(MOST_TRIES)):
             quality, material = self._candidate(int(size), 1.0)
             reached = max(reached, quality)
@@ -136,8 +144,9 @@ class Compressor:
                 low = size
             if high / low < CLOSE:
                 break
-            guess = size * 2 ** ((wanted - quality + 0.1) / SLOPE)
-            size = min(max(guess, low * (high / low) ** 0.2), low * (high / low) ** 0.8)
+            guess = size * 2 ** ((wanted - quality + MARGIN) / SLOPE)
+            inner_low, inner_high = (low * (high / low) ** share for share in INNER)
+            size = min(max(guess, inner_low), inner_high)
             if best is None and (guess >= LARGEST_SIZE or tries_left == 1):
                 size = float(LARGEST_SIZE)
         if best is None:
@@ -146,12 +155,15 @@ class Compressor:
         return best
 
     def _candidate(self, size: int, spread: float) -> tuple[float, SomManBrdf]:
-        """A material of at most so many bytes, with more or fewer nodes than usual; -inf if it is larger."""
+        """A material for a size, with `spread` times the usual number of nodes, and its quality.
+
+        The quality is -inf if the material came out larger than `size` bytes.
+        """
         nodes = int(np.clip(spread * usual_nodes(size), SMALLEST, LARGEST))
         problem = self._fitter.problem(nodes)
         gains, shapes = (min(MOST_ENTRIES, round(share * math.sqrt(nodes))) for share in (GAINS, SHAPES))
         head = file.head_bytes(self._brdf.name, self._sha256, self._made_from)
-        if size < 2 * head:
+        if size < 2 * head:  # less than half of the file would be left for the material
             expected = f"a size of at least {2 * head} bytes, twice what its name and source take"
             raise MaterialError(f"{self._brdf.name}: expected {expected}, found {size}")
         found, stream = quantise(problem, gains, shapes, size - head, seed=self._seed)
@@ -167,7 +179,7 @@ class Compressor:
             made_from=self._made_from,
         )
         error = problem.error + problem.excess(found.values())
-        # Rounded, so that the last bits of a machine's sums do not decide.
+        # Rounded, so that rounding errors, which differ between machines, do not decide between candidates.
         quality = round(self._quality(material), 3) if self._quality else -error
         written = head + len(stream)
         self.tried.append((written, problem.lattice.size, quality))
@@ -182,14 +194,16 @@ def compress(
     quality: Quality | None = None,
     progress: Progress | None = None,
 ) -> tuple[SomManBrdf, CompactReport]:
-    """Compresses any BRDF into a compact material.
+    """Compresses any BRDF into a compact material; returns it with a report.
 
-    quality: what `target_psnr` is about, and how candidates of one size are judged. Raises OptionError if a PSNR is
-    asked for without it, MaterialError if the target cannot be met, MissingDependencyError without SciPy.
+    quality: gives a candidate's quality [dB], which `target_psnr` refers to, and by which candidates of the same size
+    are compared. progress: called with the steps done and the steps in all.
+    Raises OptionError if a PSNR is asked for without `quality`, MaterialError if the target cannot be met, and
+    MissingDependencyError without SciPy.
     """
     options = options or CompactOptions()
     if options.target_psnr is not None and quality is None:
-        raise OptionError("target_psnr: expected a function that measures it, found none")
+        raise OptionError("target_psnr: a function that measures the quality is needed; pass one as `quality`")
     started = time.perf_counter()
     steps, done = 1 + (len(SPREAD) if options.target_size is not None else MOST_TRIES), 0
 
@@ -211,6 +225,6 @@ def compress(
 
 
 def usual_nodes(size: int) -> int:
-    """The number of nodes that is usually best for so many bytes."""
+    """The number of nodes that is usually best for a file of `size` bytes: USUAL, interpolated in logarithms."""
     bytes_, nodes = (np.log(np.array(column, np.float64)) for column in zip(*USUAL, strict=True))
     return round(float(np.exp(np.interp(math.log(size), bytes_, nodes))))
