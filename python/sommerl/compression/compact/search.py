@@ -27,18 +27,23 @@ from .quantise import quantise
 Quality = Callable[[SomManBrdf], float]  #: of a candidate, in decibels
 Progress = Callable[[int, int], None]  #: steps done, steps in all
 
-DEFAULT_PSNR = 48.0  # dB
-SMALLEST_SIZE, LARGEST_SIZE = 300, 64_000  # bytes
-LOWEST_PSNR, HIGHEST_PSNR = 20.0, 80.0
-FIRST_SIZE = 2000.0
-SLOPE = 2.4  # dB for each doubling of the size: only a first guess
-MARGIN = 0.1
-INNER = 0.2, 0.8
-CLOSE = 1.04  # sizes nearer to each other than that are not told apart
-MOST_TRIES = 7
-SPREAD = (1.0, 0.8, 1.2)  # of the number of nodes that is usual for a size
+DEFAULT_PSNR = 48.0  # dB: a little more than the preset `paper` reaches on RGL's materials (docs/method.md)
+SMALLEST_SIZE, LARGEST_SIZE = 300, 64_000  # bytes: readers have to accept what is written (docs/format.md)
+LOWEST_PSNR, HIGHEST_PSNR = 20.0, 80.0  # dB: at 80, one 8-bit value in 1,500 differs by 1
 
-# Bytes, and the nodes that are usually best for them.
+# The search for a quality
+FIRST_SIZE = 2000.0  # bytes: of RGL's seven materials, four reach DEFAULT_PSNR with 1,000 bytes, six with 2,700
+SLOPE = (
+    2.4  # dB for each doubling of the size, to guess the next size; a little more than usual, so that steps are small
+)
+MARGIN = 0.1  # dB: the guess aims at this much more than what is wanted
+INNER = 0.2, 0.8  # the guess stays between these places in the range that is left, so each candidate narrows it
+MOST_TRIES = 7
+CLOSE = 1.04  # the ratio of sizes at which the search ends: what seven bisections of the whole range lead to
+
+# The search for the best material of a size
+SPREAD = (1.0, 0.8, 1.2)  # numbers of nodes that are tried, in units of the usual number
+# Bytes, and the numbers of nodes that are usually best for them.
 USUAL = (
     (300, 350),
     (500, 700),
@@ -49,8 +54,9 @@ USUAL = (
     (32_000, 42_000),
     (64_000, 75_000),
 )
-GAINS, SHAPES = 3.4, 2.6  # entries for the square root of a node
-MOST_ENTRIES = 1024
+
+GAINS, SHAPES = 3.4, 2.6  # entries of a palette, in units of the square root of the number of nodes
+MOST_ENTRIES = 1024  # of a palette in a file (docs/format.md)
 
 
 @dataclass(frozen=True)
