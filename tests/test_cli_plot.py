@@ -62,7 +62,11 @@ def test_materials_of_one_name_are_told_apart(capsys, smrl, tmp_path):
         (["{}/none.smrl", "-o", "{}/x.png"], 1, "none.smrl: there is no such file"),
         (["nickle", "-o", "{}/x.png"], 1, "did you mean nickel?"),
         (["nickel", "-o", "{}/x.png", "--kind", "lobe"], 2, "invalid choice: 'lobe' (choose from"),
-        (["nickel", "-o", "{}/x.png", "--kind", "palette"], 1, "expected a compressed material, with a palette"),
+        (
+            ["nickel", "-o", "{}/x.png", "--kind", "palette"],
+            1,
+            "it has no palette, since it is not a compressed material",
+        ),
         (["nickel", "-o", "{}/x.png", "--kind", "usage"], 1, "nickel (SGD stand-in): expected a compressed material"),
         (["nickel", "-o", "{}/x.png", "--kind", "hits"], 1, "expected a material on a lattice of cells"),
         (["nickel", "nickel", "-o", "{}/x.png"], 2, "materials: expected different ones, found nickel twice"),

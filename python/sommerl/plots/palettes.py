@@ -76,7 +76,7 @@ def usage(ax: Any, material: Brdf) -> None:
 
 def _compressed(material: Brdf) -> SomManBrdf:
     if not isinstance(material, SomManBrdf):
-        raise MaterialError(f"{material.name}: expected a compressed material, with a palette, found another kind")
+        raise MaterialError(f"{material.name}: it has no palette, since it is not a compressed material")
     return material
 
 

@@ -65,7 +65,7 @@ class Sampler(ABC):
         """
         viewer, numbers = vectors("sample", wo, u)
         if ((numbers < 0) | (numbers > 1)).any():
-            raise ValueError("sample: expected random numbers from 0 to 1, found others")
+            raise ValueError("sample: random numbers have to be from 0 to 1, and some are not")
         known = np.asarray(np.isfinite(viewer + numbers).all(axis=-1))
         above = known & (viewer[..., 2] > 0)
         viewer = np.where(above[..., None], viewer, UP)

@@ -27,31 +27,34 @@ from .quantise import Problem
 Array = NDArray[np.float64]
 Choices = dict[int, tuple[list[int], float]]  #: for each number of nodes: their places, and the error left
 
-# Numbers of the lattice
-SMALLEST, LARGEST = 100, 100_000  # nodes
-BANDS = 6
-MOST_ROWS, MOST_NODES = 90, 44
-FEWEST_ROWS = 5
-LEAST_SHARE = 0.8
+# Numbers of nodes
+SMALLEST, LARGEST = 100, 100_000  # a file holds 131,072 at most (docs/format.md)
+BANDS = 6  # 3, 4 and 9 are within 0.5 dB (docs/method.md)
+MOST_ROWS, MOST_NODES = (
+    90,
+    44,
+)  # MOST_NODES: on an axis of a band. They bound the work; chrome needs all of 42,000 nodes
+FEWEST_ROWS = 5  # far below what is chosen: 11 to 19 rows for the smallest lattices of chm_orange and chrome
+LEAST_SHARE = 0.8  # of the nodes asked for; 0.5 and 0.95 give the same lattices
 
-# Where the errors of an axis are measured
-LINES = 500
-ROWS_FOR_BANDS = 20
-BAND_ROWS = 10
-ROWS_EVERY_D, ROWS_EVERY_P = 3.0, 4.0
-THETA_D_EVERY_P, PHI_D_EVERY_D = 9.0, 6.0
+# Where the errors of an axis are measured. Steps are those of the fine grid.
+ROWS_EVERY_D, ROWS_EVERY_P = 3.0, 4.0  # steps in θ_d and φ_d between lines along θ_h: at most 2,745,
+LINES = 500  # of which this many are drawn at random
+ROWS_FOR_BANDS = 20  # in the best lattice of this many rows, all bands have about equally many
+BAND_ROWS = 10  # rows of the fine grid in each band, on which there are
+THETA_D_EVERY_P, PHI_D_EVERY_D = 9.0, 6.0  # 200 lines along θ_d, and 310 along φ_d, this many steps apart
 
-# The bisection
-PRICES = -13.0, 3.0
-BISECTIONS = 20
-UNKNOWN = 1e30
+# The price of a node, by bisection
+PRICES = -13.0, 3.0  # decades, in units of the error left with FEWEST_ROWS rows: from almost free to far too dear
+BISECTIONS = 20  # 12 give the same lattices
+UNKNOWN = 1e30  # stands for the error of numbers of nodes that were not examined: more than any error
 
 # The least squares
-DIRECTIONS = 1_000_000
-MEASURE_POWER = 0.5
-LOWEST_COSINE = 1e-4
-RIDGE = 0.05
-MOST_ITERATIONS, TOLERANCE = 200, 1e-5
+DIRECTIONS = 1_000_000  # ten for each node of the largest lattice
+MEASURE_POWER = 0.5  # weights are solid angle times cosines to this power; 0.35 and 0.7 are no better (docs/method.md)
+LOWEST_COSINE = 1e-4  # closer to the horizon, no directions are drawn: f_r may have no bound there
+RIDGE = 0.05  # of the median of the matrix's diagonal
+MOST_ITERATIONS, TOLERANCE = 200, 1e-5  # of the conjugate gradients
 
 
 @dataclass(frozen=True)

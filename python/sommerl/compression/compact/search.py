@@ -80,7 +80,7 @@ class CompactOptions:
             if self.target_size is not None:
                 object.__setattr__(self, "target_size", index(self.target_size))
         except TypeError as error:
-            raise OptionError(f"target_size, seed: expected whole numbers, found others ({error})") from error
+            raise OptionError(f"target_size, seed: they have to be whole numbers ({error})") from error
         if self.target_size is not None and not SMALLEST_SIZE <= self.target_size <= LARGEST_SIZE:
             raise OptionError(f"target_size: expected {SMALLEST_SIZE} to {LARGEST_SIZE}, found {self.target_size}")
         psnr = self.target_psnr
@@ -131,7 +131,9 @@ class Compressor:
         best = max((self._candidate(size, spread) for spread in SPREAD), key=lambda each: each[0])
         if best[0] == -math.inf:
             least = min(tried[0] for tried in self.tried)
-            raise MaterialError(f"{self._brdf.name}: expected a file of {size} bytes, found none below {least}")
+            raise MaterialError(
+                f"{self._brdf.name}: it cannot be compressed to {size} bytes; the smallest file found has {least} bytes"
+            )
         return best
 
     def of_quality(self, wanted: float) -> tuple[float, SomManBrdf]:
@@ -156,8 +158,10 @@ class Compressor:
             if best is None and (guess >= LARGEST_SIZE or tries_left == 1):
                 size = float(LARGEST_SIZE)
         if best is None:
-            found = f"{reached:.1f} dB with {LARGEST_SIZE} bytes"
-            raise MaterialError(f"{self._brdf.name}: expected at least {wanted:g} dB, found no more than {found}")
+            raise MaterialError(
+                f"{self._brdf.name}: it cannot be compressed with {wanted:g} dB; the best file found has "
+                f"{reached:.1f} dB with {LARGEST_SIZE} bytes"
+            )
         return best
 
     def _candidate(self, size: int, spread: float) -> tuple[float, SomManBrdf]:
@@ -170,8 +174,10 @@ class Compressor:
         gains, shapes = (min(MOST_ENTRIES, round(share * math.sqrt(nodes))) for share in (GAINS, SHAPES))
         head = file.head_bytes(self._brdf.name, self._sha256, self._made_from)
         if size < 2 * head:  # less than half of the file would be left for the material
-            expected = f"a size of at least {2 * head} bytes, twice what its name and source take"
-            raise MaterialError(f"{self._brdf.name}: expected {expected}, found {size}")
+            raise MaterialError(
+                f"{self._brdf.name}: its name and source take {head} bytes of the {size} asked for; ask for at least "
+                f"{2 * head} bytes"
+            )
         found, stream = quantise(problem, gains, shapes, size - head, seed=self._seed)
         material = SomManBrdf(
             shape_values(found.shapes),
