@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from sommerl import load
+from sommerl.compression.compact.fitted_table import FittedTable
 from sommerl.compression.compact.lattice_fit import Fitter
 from sommerl.compression.compact.quantise import quantise
 from sommerl.compression.compact.search import GAINS, SHAPES, usual_nodes
-from sommerl.reflectance.nodes import FittedTable
 from sommerl.render.compare import judge_on_sphere
 from sommerl.render.environment import default_environment
 

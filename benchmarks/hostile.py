@@ -36,6 +36,7 @@ import numpy as np
 
 import sommerl
 from sommerl import Lattice
+from sommerl.compression.palette import GainsAndShapes
 from sommerl.compression.smrl import file as smrl
 from sommerl.compression.smrl.codes import gain_values, shape_values
 from sommerl.factored import file as fbrdf
@@ -290,7 +291,7 @@ def smrl_seeds(nodes: bool) -> list[bytes]:
         lattice = NodeLattice((0, 60, 180), (0, 0, 1), ((0, 90, 180), (0, 180)), ((0, 90), (0,)))
         gain, shape = (rng.integers(0, 3, lattice.size).astype(np.uint16) for _ in range(2))
         lut, gains = shape_values(np.array([[-3, 0], [0, 1], [5, 7]])), gain_values(np.array([3, 200, 900]))
-        made = sommerl.SomManBrdf(lut, shape, lattice, gains=gains, gain_index=gain, scale=0.04, **known)
+        made = sommerl.SomManBrdf(GainsAndShapes(gains, lut, 0.04), np.stack([gain, shape]), lattice, **known)
     else:
         cells = Lattice(3, 4, 5)
         made = sommerl.SomManBrdf(rng.random((4, 3)), rng.integers(0, 4, cells.shape).astype(np.uint8), cells, **known)

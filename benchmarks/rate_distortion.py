@@ -51,7 +51,7 @@ def measured(path: Path, options: argparse.Namespace, environment: Any) -> list[
     found = representations(source, path.stem, options.sizes, options.nbrdf)
     candidates = [representation.brdf for representation in found]
     comparisons = compare_on_sphere(source, candidates, environment, size=options.size, spp=options.spp)
-    reference = BrdfTable.sample(source)
+    reference = BrdfTable.sampled(source)
     rows: list[Row] = []
     for representation, comparison in zip(found, comparisons, strict=True):
         row = {"material": short_name(path.stem), "family": representation.family, "label": representation.label}
@@ -63,7 +63,7 @@ def measured(path: Path, options: argparse.Namespace, environment: Any) -> list[
 
 def log_error(reference: BrdfTable, brdf: Brdf) -> float:
     """Of a representation at the reference's cell centres."""
-    sampled = BrdfTable.sample(brdf, reference.lattice)
+    sampled = BrdfTable.sampled(brdf, reference.lattice)
     return table_metrics(reference.values, sampled.values, reference.lattice).log_error_cosine
 
 

@@ -6,6 +6,7 @@ import zlib
 import numpy as np
 
 from sommerl import SomManBrdf
+from sommerl.compression.palette import GainsAndShapes
 from sommerl.compression.smrl.codes import gain_values, shape_values
 from sommerl.compression.smrl.file import MAGIC, VERSION, decode
 from sommerl.reflectance.nodes import FINE, NodeLattice
@@ -34,8 +35,8 @@ def material(case="smooth", seed=0):
         shape_codes[:] = 0
     shape_codes = shape_codes[np.lexsort(shape_codes.T[::-1])]
     gain, shape = (_entries(rng, n, lattice.size, manner) for n in (gains, shapes))
-    values = {"gains": gain_values(gain_codes), "gain_index": gain, "scale": float(np.float32(0.1 + rng.random()))}
-    return SomManBrdf(shape_values(shape_codes), shape, lattice, name="made up", **values)
+    palette = GainsAndShapes(gain_values(gain_codes), shape_values(shape_codes), 0.1 + rng.random())
+    return SomManBrdf(palette, np.stack([gain, shape]), lattice, name="made up")
 
 
 def random_lattice(rng, bands, inner):
@@ -76,14 +77,21 @@ def broken(body):
 
 def same_numbers(one, other):
     """Whether two materials look up the same, bit for bit."""
-    same = (one.lattice, one.interpolation, one.scale) == (other.lattice, other.interpolation, other.scale)
+    same = (one.lattice, one.interpolation, scale(one)) == (other.lattice, other.interpolation, scale(other))
     return same and all(a.tobytes() == b.tobytes() for a, b in zip(arrays(one), arrays(other), strict=True))
 
 
 def arrays(material):
     """LUT, indices, gains and their indices."""
-    gain_index = getattr(material, "gain_index", np.zeros(0, np.uint16))
-    return material.lut, material.index, material.gains, gain_index
+    if material.grid:
+        return material.lut, material.index, np.zeros(0), np.zeros(0, np.uint16)
+    gain, shape = material.index
+    return material.lut, shape, material.palette.gains, gain
+
+
+def scale(material):
+    """Of the cube-root domain; 1 for a material of cells."""
+    return 1.0 if material.grid else material.palette.scale
 
 
 def stream(file):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sommerl import BrdfTable, Lattice, SomManBrdf
 from sommerl.commands.cli import main
+from sommerl.compression.palette import GainsAndShapes
 from sommerl.compression.smrl.codes import gain_values, shape_values
 from sommerl.reflectance.nodes import NodeLattice
 from sommerl.system.errors import SommerlError
@@ -68,12 +69,9 @@ def compact_material(lattice: NodeLattice, gains: int = 20, shapes: int = 15, *,
     shape_codes = np.sort(rng.integers(-120, 121, (shapes, 2)), axis=0)
     gain_index, index = (rng.integers(0, count, lattice.size).astype(np.uint16) for count in (gains, shapes))
     return SomManBrdf(
-        shape_values(shape_codes),
-        index,
+        GainsAndShapes(gain_values(gain_codes), shape_values(shape_codes), 0.04),
+        np.stack([gain_index, index]),
         lattice,
-        gains=gain_values(gain_codes),
-        gain_index=gain_index,
-        scale=0.04,
         name=name,
     )
 

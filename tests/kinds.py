@@ -7,10 +7,10 @@ from rgl_files import fields
 from sampled import HANDED, NODES, lobe
 
 from sommerl import BrdfTable, SomManBrdf, builtin
+from sommerl.compression.compact.fitted_table import FittedTable
 from sommerl.formats.rgl import RglBrdf
 from sommerl.models.multi_lobe import FAMILIES, MultiLobe
 from sommerl.models.nbrdf import WEIGHTS, NeuralBrdf
-from sommerl.reflectance.nodes import FittedTable
 
 RNG = np.random.default_rng(1)
 VALUES = 0.3 * RNG.random((*SMALL.shape, 3)) ** 4

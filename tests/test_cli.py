@@ -53,7 +53,7 @@ def test_compress_and_info(capsys, folder, tmp_path):
     assert (info["kind"], info["name"], info["lattice"]) == ("som-man", "pearl", [90, 90, 180])
     assert (info["interpolation"], info["domain"]) == ("nearest", "linear")
     assert info["options"]["rule"] in ("paper", "kohonen")
-    assert info["source_sha256"] == load_table(folder / "pearl.binary").source_sha256
+    assert info["source_sha256"] == load_table(folder / "pearl.binary").source.sha256
 
 
 def test_same_options_same_bytes(folder, tmp_path):
@@ -238,7 +238,7 @@ def test_bad_files_are_refused_by_every_command(capsys, tmp_path, command, name)
         (["compress", "nickel", "-o", "{}/x.binary"], 2, "expected a name that ends in .smrl, found '.binary'"),
         (["compress", "nickel", "chrome", "-o", "{}/x.smrl"], 2, "expected a folder that exists"),
         (["compress", "nickel", "nickel", "-o", "{}"], 2, "two that would be written to one file"),
-        (["render", "nickel", "-o", "{}/x.png", "--lookup", "nearest"], 1, "found a formula"),
+        (["render", "nickel", "-o", "{}/x.png", "--lookup", "nearest"], 1, "found another (formula)"),
         (["compress", "nickel", "-o", "{}/x.smrl", "--clusters", "0"], 2, "clusters: expected 1 to 65536, found 0"),
         (["compress", "nickel", "-o", "{}/x.smrl", "--clusters", "many"], 2, "invalid int value: 'many'"),
         (["compress", "nickel", "-o", "{}/x.smrl", "--alpha", "nan"], 2, "alpha: expected a number above 0"),

@@ -56,7 +56,7 @@ def test_all_models_in_a_table(capsys):
 
 def test_a_table_and_a_compressed_one(capsys, tmp_path):
     table, compact = tmp_path / "red.binary", tmp_path / "red.smrl"
-    merl.write(BrdfTable.sample(builtin("red-fabric")), table)
+    merl.write(BrdfTable.sampled(builtin("red-fabric")), table)
     run_json(capsys, "compress", table, "-o", compact, "--clusters", "64", "--epochs", "1")
     found = [
         run_json(capsys, "fit", path, *QUICK, "--model", "ggx")["fits"][0]["parameters"][1]["alpha"]
@@ -137,7 +137,7 @@ def test_figure_5(capsys, tmp_path):
 
 def test_data_of_ones_own(capsys, tmp_path):
     for name in ("purple-paint", "x"):
-        merl.write(BrdfTable.sample(builtin("red-fabric")), tmp_path / f"{name}.binary")
+        merl.write(BrdfTable.sampled(builtin("red-fabric")), tmp_path / f"{name}.binary")
     assert material(tmp_path, "purple-paint").name == "purple-paint"
     assert material(None, "purple-paint").name.startswith("purple-paint")
     assert set(expected("table1")) <= set(NAMES)

@@ -8,7 +8,6 @@ from helpers import compact_material, must_fail, random_directions, run, run_jso
 
 from sommerl import MERL, BrdfTable, load, save
 from sommerl.formats import merl, rgl
-from sommerl.formats.load import interpolated
 from sommerl.reflectance.nodes import NodeLattice
 from sommerl.render.bsdf import make_bsdf, register, snippet
 from sommerl.render.llvm import drjit, mitsuba
@@ -41,7 +40,7 @@ def test_info(capsys, path):
 
 
 def check_metrics(result, reference, candidate):
-    first, second = (BrdfTable.sample(brdf).values[MERL.above_horizon] for brdf in (reference, candidate))
+    first, second = (BrdfTable.sampled(brdf).values[MERL.above_horizon] for brdf in (reference, candidate))
     assert result["table_relative_error"] == pytest.approx(np.linalg.norm(second - first) / np.linalg.norm(first))
 
 
@@ -79,18 +78,18 @@ def check_only_trilinear(status, message):
 
 def test_there_is_no_nearest_node(capsys, path, tmp_path):
     with pytest.raises(MaterialError, match="tiny: expected trilinear interpolation between nodes, found nearest"):
-        interpolated(load(path), "nearest")
+        load(path).with_interpolation("nearest")
     for command in (["render", path, "-o", tmp_path / "x.png"], ["compare", path, "nickel"]):
         status, out, message = run(capsys, *command, *SMALL_PICTURE, "--lookup", "nearest")
         check_only_trilinear(status, message)
         assert out == ""
         status, _, message = run(capsys, *command, *SMALL_PICTURE, "--lookup", "trilinear")
         must_fail(check_only_trilinear, status, message)
-    assert interpolated(load(path), "trilinear").lattice == LATTICE
+    assert load(path).with_interpolation("trilinear").lattice == LATTICE
 
 
 def check_cells(table, brdf):
-    expected = BrdfTable.sample(brdf).values
+    expected = BrdfTable.sampled(brdf).values
     above = MERL.above_horizon
     assert np.allclose(table.values[above], expected[above], rtol=1e-14, atol=0)
 

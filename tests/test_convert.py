@@ -133,7 +133,7 @@ def test_source_code(capsys, tmp_path, extension):
 
 
 def test_source_code_of_what_is_not_compressed_yet(capsys, tmp_path, monkeypatch):
-    small = BrdfTable.sample(builtin("nickel"), Lattice(20, 20, 20))
+    small = BrdfTable.sampled(builtin("nickel"), Lattice(20, 20, 20))
     monkeypatch.setattr("sommerl.commands.convert.BrdfTable.of", lambda brdf: small)
     run_json(capsys, "convert", "nickel", tmp_path / "nickel.h")
     assert "material_nickel" in (tmp_path / "nickel.h").read_text()
@@ -167,7 +167,7 @@ def test_bad_options(capsys, tmp_path, arguments, sentence):
 def test_content_and_not_the_extension_tells(tmp_path):
     (tmp_path / "x.binary").write_bytes(content())
     assert load(tmp_path / "x.binary").name == "x"
-    merl.write(BrdfTable.sample(builtin("red-fabric")), tmp_path / "y.bsdf")
+    merl.write(BrdfTable.sampled(builtin("red-fabric")), tmp_path / "y.bsdf")
     assert isinstance(load(tmp_path / "y.bsdf"), BrdfTable)
 
 

@@ -99,7 +99,7 @@ def written_by_all(folder):
     material = compact_material(NODES)
     smrl.save(material, folder / "nodes.smrl")
     smrl.save(train(lambertian_table(), TrainOptions(clusters=1, epochs=1))[0], folder / "cells.smrl")
-    fbrdf.save(factor(BrdfTable.sample(builtin("chrome"), SMALL), FactorOptions(1, 1)), folder / "x.fbrdf")
+    fbrdf.save(factor(BrdfTable.sampled(builtin("chrome"), SMALL), FactorOptions(1, 1)), folder / "x.fbrdf")
     for extension in shader.LANGUAGES:
         shader.write(material, folder / f"x{extension}")
     for name, extension in (("xml", ".xml"), ("snippet", ".json")):
@@ -156,7 +156,7 @@ def test_what_sommerl_wrote_is_replaced_and_nothing_else(tmp_path):
 
 
 def test_measurements_are_kept_under_any_name_and_also_if_we_wrote_them(tmp_path):
-    merl.write(BrdfTable.sample(builtin("nickel"), MERL), tmp_path / "x.binary")
+    merl.write(BrdfTable.sampled(builtin("nickel"), MERL), tmp_path / "x.binary")
     rgl_export.write(builtin("nickel"), tmp_path / "x.bsdf")
     for name in ("x.binary", "x.bsdf"):
         content = (tmp_path / name).read_bytes()

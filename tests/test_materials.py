@@ -97,4 +97,4 @@ def test_unknown_names_suggest_the_nearest():
 
 
 def test_any_brdf_can_be_sampled_to_any_lattice():
-    assert BrdfTable.sample(builtin("chrome"), SMALL).lattice == SMALL
+    assert BrdfTable.sampled(builtin("chrome"), SMALL).lattice == SMALL

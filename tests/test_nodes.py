@@ -3,9 +3,10 @@ import pytest
 from helpers import must_fail, random_directions
 
 from sommerl import BrdfTable, Lattice
+from sommerl.compression.compact.fitted_table import FittedTable
 from sommerl.reflectance.arrays import split
 from sommerl.reflectance.half_diff import directions
-from sommerl.reflectance.nodes import FINE, FittedTable, NodeLattice, angles_at, damped, place
+from sommerl.reflectance.nodes import FINE, NodeLattice, angles_at, damped, place
 from sommerl.render.bsdf import make_bsdf, upload
 from sommerl.render.llvm import mitsuba
 from sommerl.system.errors import MaterialError

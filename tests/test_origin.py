@@ -19,7 +19,7 @@ from sommerl.compression.smrl import file
 from sommerl.factored import file as fbrdf
 from sommerl.factored.fit import FactorOptions, factor
 from sommerl.formats.load import load
-from sommerl.reflectance.origin import MOST_LINKS, full_chain, source_of
+from sommerl.reflectance.origin import MOST_LINKS, source_of
 from sommerl.system.errors import FormatError
 from sommerl.system.sealed_file import PREFIX
 
@@ -35,10 +35,10 @@ def digest(path):
 def check_made_from(material, path, kind):
     """That it is of the file, and what the file was made from follows."""
     before = load(path)
-    assert material.source_sha256 == digest(path)
-    assert [link["kind"] for link in full_chain(material)] == [kind, "source"]
-    assert [link["sha256"] for link in full_chain(material)] == [digest(path), before.source_sha256]
-    assert {link["name"] for link in full_chain(material)} == {before.name}
+    assert material.source.sha256 == digest(path)
+    assert [link["kind"] for link in material.source.chain()] == [kind, "source"]
+    assert [link["sha256"] for link in material.source.chain()] == [digest(path), before.source.sha256]
+    assert {link["name"] for link in material.source.chain()} == {before.name}
 
 
 @pytest.fixture(scope="module", params=FILES)
@@ -51,7 +51,7 @@ def test_by_the_preset_paper(tmp_path, source):
     save(material, tmp_path / "x.smrl")
     check_made_from(load(tmp_path / "x.smrl"), source, FILES[source.name])
     before = load(source)
-    before.file_sha256 = before.source_sha256  # as it was: the original's hash
+    before.file_sha256 = before.source.sha256  # as it was: the original's hash
     must_fail(check_made_from, train(BrdfTable.of(before), QUICK)[0], source, FILES[source.name])
 
 
@@ -71,8 +71,8 @@ def test_by_factoring(tmp_path):
     check_made_from(material, GOLDEN / "cells.smrl", "som-man")
     fbrdf.save(material, tmp_path / "x.fbrdf")
     again = load(tmp_path / "x.fbrdf")  # whose format has no room for more
-    assert again.source_sha256 == digest(GOLDEN / "cells.smrl")
-    assert full_chain(again) == ()
+    assert again.source.sha256 == digest(GOLDEN / "cells.smrl")
+    assert again.source.chain() == ()
 
 
 def test_a_chain_grows_to_its_bound_and_keeps_its_ends(tmp_path):
@@ -80,12 +80,12 @@ def test_a_chain_grows_to_its_bound_and_keeps_its_ends(tmp_path):
     table = lambertian_table()
     path = tmp_path / "0.smrl"
     save(train(table, QUICK)[0], path)
-    hashes = [table.source_sha256, digest(path)]
+    hashes = [table.source.sha256, digest(path)]
     for number in range(1, MOST_LINKS + 4):
         material, _ = train(BrdfTable.of(load(path)), QUICK)
         path = tmp_path / f"{number}.smrl"
         save(material, path)
-        found = [link["sha256"] for link in full_chain(load(path))]
+        found = [link["sha256"] for link in load(path).source.chain()]
         newest = hashes[::-1]
         assert found == (newest if len(newest) <= MOST_LINKS else newest[: MOST_LINKS - 1] + newest[-1:])
         hashes.append(digest(path))
@@ -95,25 +95,26 @@ def test_what_is_made_from_no_compressed_material_says_nothing():
     """And its file is what it was."""
     for table in (lambertian_table(), BrdfTable.of(load("nickel"))):
         material, _ = train(table, QUICK)
-        assert material.made_from == ()
+        assert material.source.made_from == ()
         assert b"made_from" not in file.encode(material)
-        assert material.source_sha256 == table.source_sha256
+        assert material.source.sha256 == table.source.sha256
     for name in FILES:
         before = load(GOLDEN / name)
         encode = fbrdf.encode if name.endswith(".fbrdf") else file.encode
         again = (fbrdf if name.endswith(".fbrdf") else file).decode(encode(before))
-        assert (again.source_sha256, again.made_from) == (before.source_sha256, ())
+        assert (again.source.sha256, again.source.made_from) == (before.source.sha256, ())
 
 
 def test_one_that_was_never_a_file():
     """Has no hash; a table of it, that of its values."""
     brdf = made()
-    sha, chain = source_of(brdf)
-    assert sha == ""
+    source = source_of(brdf)
+    chain = source.made_from
+    assert source.sha256 == ""
     assert [link["kind"] for link in chain] == ["factored", "source"]
-    assert chain[1]["sha256"] == brdf.source_sha256
+    assert chain[1]["sha256"] == brdf.source.sha256
     table = BrdfTable.of(brdf)
-    assert table.source_sha256 == BrdfTable.sample(brdf).source_sha256
+    assert table.source.sha256 == BrdfTable.sampled(brdf).source_sha256
 
 
 def test_convert_copies_it(capsys, tmp_path):
@@ -203,5 +204,5 @@ def test_a_chain_that_is_one():
     data = (GOLDEN / "cells.smrl").read_bytes()
     chain = [LINK | {"name": "a\x1b[31m"}, NEXT, NEXT | {"sha256": ""}]
     found = file.decode(with_notes(data, json.dumps({"made_from": chain}).encode()))
-    assert [link["name"] for link in found.made_from] == ["a\ufffd[31m", "a", "a"]
+    assert [link["name"] for link in found.source.made_from] == ["a\ufffd[31m", "a", "a"]
     assert np.array_equal(found.index, file.decode(data).index)

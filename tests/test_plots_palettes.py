@@ -34,12 +34,12 @@ def test_swatches_are_the_luts_entries(entries):
 def check_products(ax, material):
     """Of each pair that a node has, its colour, in the shape's column and the row of the gain; nothing else."""
     pixels = ax.get_images()[0].get_array()
-    assert pixels.shape == (len(material.gains), len(material.lut), 4)
-    rank = np.argsort(np.argsort(-material.gains, kind="stable"))
-    pairs = set(zip(rank[material.gain_index].tolist(), material.index.tolist(), strict=True))
+    assert pixels.shape == (len(material.palette.gains), len(material.lut), 4)
+    rank = np.argsort(np.argsort(-material.palette.gains, kind="stable"))
+    pairs = set(zip(rank[material.index[0]].tolist(), material.index[1].tolist(), strict=True))
     assert pairs == set(zip(*(axis.tolist() for axis in np.nonzero(pixels[..., 3])), strict=True))
-    y = material.gains[:, None, None] * material.lut
-    f_r = material.scale * np.maximum(y, 0)[np.argsort(rank)] ** 3
+    y = material.palette.gains[:, None, None] * material.lut
+    f_r = material.palette.scale * np.maximum(y, 0)[np.argsort(rank)] ** 3
     used = pixels[..., 3] == 255
     assert np.array_equal(pixels[used][:, :3], Tone.of(f_r[used]).srgb8(f_r[used]))
 
@@ -72,8 +72,8 @@ def test_the_uses_of_entries_add_up_to_the_cells():
     nodes = compact("smooth")
     shapes, gains = bars(drawn(plots.usage, nodes))
     assert shapes.sum() == gains.sum() == nodes.lattice.size
-    assert np.array_equal(shapes, np.bincount(nodes.index, minlength=len(nodes.lut)))
-    assert np.array_equal(gains, np.bincount(nodes.gain_index, minlength=len(nodes.gains)))
+    assert np.array_equal(shapes, np.bincount(nodes.index[1], minlength=len(nodes.lut)))
+    assert np.array_equal(gains, np.bincount(nodes.index[0], minlength=len(nodes.palette.gains)))
 
 
 # The hits of Fig. 2

@@ -90,9 +90,9 @@ def test_nothing_positive_is_refused():
 
 
 def test_an_unknown_interpolation_is_refused(small_table):
-    with pytest.raises(MaterialError, match="expected nearest or trilinear, found linear"):
+    with pytest.raises(MaterialError, match="small: expected nearest or trilinear interpolation, found linear"):
         small_table.with_interpolation("linear")
-    with pytest.raises(MaterialError, match="expected nearest or trilinear, found linear"):
+    with pytest.raises(MaterialError, match="small: expected nearest or trilinear interpolation, found linear"):
         BrdfTable(small_table.values, SMALL, interpolation="linear")
 
 
@@ -102,9 +102,9 @@ def test_another_shape_is_refused():
 
 
 def test_sampling_a_table_gives_it_back(small_table):
-    again = BrdfTable.sample(small_table.with_interpolation("nearest"), SMALL)
+    again = BrdfTable.sampled(small_table.with_interpolation("nearest"), SMALL)
     assert np.array_equal(again.values, small_table.values)
-    assert np.allclose(BrdfTable.sample(small_table, SMALL).values, small_table.values)
+    assert np.allclose(BrdfTable.sampled(small_table, SMALL).values, small_table.values)
 
 
 def test_grazing_directions_see_the_last_cell_above_the_horizon():

@@ -8,14 +8,16 @@ from pathlib import Path
 import compact
 import numpy as np
 import pytest
-from compact import arrays, broken, same_numbers, sealed
+from compact import arrays, broken, same_numbers, scale, sealed
 from helpers import SMALL, lambertian_table, must_fail, random_directions
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sommerl import Lattice, SomManBrdf, SommerlError, TrainOptions, load, save, train
+from sommerl.compression.palette import GainsAndShapes
 from sommerl.compression.smrl.file import CELLS_HEAD, NODES_HEAD, decode, encode
 from sommerl.reflectance.nodes import NodeLattice
+from sommerl.reflectance.origin import Source
 from sommerl.system.errors import FormatError, MaterialError, OptionError
 from sommerl.system.sealed_file import PREFIX
 
@@ -34,7 +36,7 @@ def made(kind, seed=0):
     """A material whose file is small."""
     material = cells(seed, 3, Lattice(3, 2, 3)) if kind == "cells" else compact.material((2, 2, 4, 4, "walk"), seed)
     material.options, material.metrics = {"seed": seed}, {"rmse": 0.25}
-    material.source_sha256 = "0123456789abcdef" * 4
+    material.source = Source("0123456789abcdef" * 4)
     return material
 
 
@@ -76,7 +78,7 @@ def cell_parts(material):
 
 def check_round_trip(before, after):
     assert same_numbers(before, after)
-    for field in ("name", "options", "metrics", "source_sha256", "domain", "bytes_memory"):
+    for field in ("name", "options", "metrics", "source", "domain", "bytes_memory"):
         assert getattr(after, field) == getattr(before, field)
 
 
@@ -124,7 +126,7 @@ def test_the_same_material_gives_the_same_bytes(small_table):
 def numbers(material):
     """The SHA-256 of all that a lookup reads."""
     lattice = material.lattice.axes() if not material.grid else (*material.lattice.shape, material.lattice.reciprocal)
-    head = json.dumps([lattice, material.interpolation, material.scale.hex()])
+    head = json.dumps([lattice, material.interpolation, scale(material).hex()])
     return hashlib.sha256(head.encode() + b"".join(part.tobytes() for part in arrays(material))).hexdigest()
 
 
@@ -149,7 +151,7 @@ def test_golden_files(kind):
     must_fail(check_golden, encode(made(kind)), kind)
     material = decode(data)
     assert material.name.startswith(f"golden {kind}")
-    assert len(material.source_sha256) == 64
+    assert len(material.source.sha256) == 64
 
 
 def check_damage_is_named(data, path):
@@ -347,7 +349,7 @@ def test_what_a_file_cannot_hold(material):
 )
 def test_lattices_that_cannot_be_written(lattice, what):
     index = np.zeros(lattice.size, np.uint16)
-    material = SomManBrdf(np.ones((1, 3)), index, lattice, name="x", gains=[0.0], gain_index=index)
+    material = SomManBrdf(GainsAndShapes([0.0], np.ones((1, 3)), 1.0), np.stack([index, index]), lattice, name="x")
     if what is None:
         check_round_trip(material, decode(encode(material)))
         return
@@ -357,10 +359,10 @@ def test_lattices_that_cannot_be_written(lattice, what):
 
 def test_palettes_that_cannot_be_written():
     for gains, lut in (([0.001], np.ones((1, 3))), ([0.0], np.full((1, 3), 0.9)), ([1.5, 0.5], np.ones((1, 3)))):
-        index = np.zeros(4, np.uint16)
+        index = np.zeros((2, 4), np.uint16)
         lattice = NodeLattice((0, 180), (0, 0), ((0, 180),), ((0,),))
         with pytest.raises(FormatError, match=r"x: .*palette"):
-            encode(SomManBrdf(lut, index, lattice, name="x", gains=gains, gain_index=index))
+            encode(SomManBrdf(GainsAndShapes(gains, lut, 1.0), index, lattice, name="x"))
 
 
 def test_errors_name_the_file(material, tmp_path):

@@ -69,14 +69,14 @@ def paint():
 
 
 def error_of(brdf):
-    source = BrdfTable.sample(builtin("purple-paint"))
-    return table_metrics(source.values, BrdfTable.sample(brdf).values, MERL).log_error_cosine
+    source = BrdfTable.sampled(builtin("purple-paint"))
+    return table_metrics(source.values, BrdfTable.sampled(brdf).values, MERL).log_error_cosine
 
 
 def test_more_nodes_are_better(paint):
     fitted = [paint.fit(nodes) for nodes in (300, 1500, 6000)]
     for nodes, brdf in zip((300, 1500, 6000), fitted, strict=True):
-        assert 0.8 * nodes <= brdf.nodes.size <= nodes
+        assert 0.8 * nodes <= brdf.lattice.size <= nodes
     errors = [error_of(brdf) for brdf in fitted]
     assert errors[0] > errors[1] > errors[2]
     assert errors[2] < 0.025
@@ -86,7 +86,7 @@ def test_least_squares_are_better_than_samples(paint, monkeypatch):
     fitted = paint.fit(1500)
     monkeypatch.setattr(fit, "RIDGE", 1e9)  # draws every node to the source's own value
     sampled = paint.fit(1500)
-    assert sampled.nodes == fitted.nodes
+    assert sampled.lattice == fitted.lattice
     assert error_of(fitted) < 0.8 * error_of(sampled)
 
 
@@ -103,8 +103,8 @@ def test_a_lambertian_comes_back():
 
 def test_the_same_seed_gives_the_same_lattice():
     one, other = (Fitter(builtin("nickel"), seed=3).fit(800) for _ in range(2))
-    assert one.nodes == other.nodes
-    assert np.array_equal(one.values, other.values)
+    assert one.lattice == other.lattice
+    assert np.array_equal(one.node_values, other.node_values)
 
 
 @pytest.mark.parametrize("nodes", [0, 99, 100_001])

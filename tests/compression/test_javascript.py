@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from compact import CASES, HOSTILE_STREAMS, arrays, bomb, broken, material, sealed, stream, written
+from compact import CASES, HOSTILE_STREAMS, arrays, bomb, broken, material, scale, sealed, stream, written
 from helpers import must_fail, tool
 from noted import FINE, NOT_PLAIN, with_notes
 
@@ -72,7 +72,7 @@ def node(tmp_path_factory):
 def described(made):
     """What JavaScript should find, arrays as bytes."""
     lut, index, gains, gain_index = (part.astype(part.dtype.newbyteorder("<")).tobytes().hex() for part in arrays(made))
-    known = {"name": made.name, "sha256": made.source_sha256, "interpolation": made.interpolation, "scale": made.scale}
+    known = {"name": made.name, "sha256": made.source.sha256, "interpolation": made.interpolation, "scale": scale(made)}
     known |= {"lut": lut, "index": index, "notes": {"options": made.options, "metrics": made.metrics}}
     lattice = made.lattice
     if made.grid:

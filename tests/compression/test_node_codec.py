@@ -21,8 +21,11 @@ def core(data, simd=None):
 
 def fields(made):
     """What a stream of a material has to hold."""
-    codes = gain_codes(made.gains).tolist(), [tuple(pair) for pair in shape_codes(coordinates(made.lut)).tolist()]
-    return *made.lattice.axes(), *codes, made.gain_index.tolist(), made.index.tolist()
+    codes = (
+        gain_codes(made.palette.gains).tolist(),
+        [tuple(pair) for pair in shape_codes(coordinates(made.lut)).tolist()],
+    )
+    return *made.lattice.axes(), *codes, *made.index.tolist()
 
 
 def palette(made):
@@ -31,7 +34,7 @@ def palette(made):
 
 def changed(made):
     """The same with another gain or shape at the last node."""
-    index = made.gain_index if len(made.gains) > 1 else made.index
+    index = made.index[0 if len(made.palette.gains) > 1 else 1]
     index[-1] = 0 if index[-1] else 1
     return made
 
@@ -72,9 +75,9 @@ def test_all_nodes_that_there_can_be():
 
 
 def check_same_bytes(made, other):
-    one = palette(made).encode(made.gain_index, made.index, "portable")
+    one = palette(made).encode(*made.index, "portable")
     for simd in _core.simd_paths():
-        assert palette(other).encode(other.gain_index, other.index, simd) == one
+        assert palette(other).encode(*other.index, simd) == one
         assert core(one, simd) == fields(made)
 
 
@@ -97,8 +100,8 @@ def check_measured(bits, data):
 @pytest.mark.parametrize("case", ["smooth", "noise", "big-palettes", "late"])
 def test_measured_bits_are_those_of_the_stream(case):
     made = material(case)
-    bits = palette(made).measure(made.gain_index, made.index)
-    data = palette(made).encode(made.gain_index, made.index)
+    bits = palette(made).measure(*made.index)
+    data = palette(made).encode(*made.index)
     check_measured(bits, data)
     must_fail(check_measured, bits, data + bytes(9))
 
@@ -259,6 +262,7 @@ def test_palettes_that_cannot_be_written(change):
 
 def test_entries_that_are_none():
     made = material()
-    for index in (made.index[:-1], np.full_like(made.index, len(made.lut))):
+    gain, shape = made.index
+    for index in (shape[:-1], np.full_like(shape, len(made.lut))):
         with pytest.raises(ValueError, match="an entry of the palette for each node"):
-            palette(made).encode(made.gain_index, index)
+            palette(made).encode(gain, index)

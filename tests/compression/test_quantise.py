@@ -107,7 +107,7 @@ def test_a_size(tmp_path, compact):
     assert save(material, tmp_path / "x.smrl") <= 900
     again = load(tmp_path / "x.smrl")
     assert np.array_equal(again.eval(A, B), material.eval(A, B))
-    assert (again.name, again.source_sha256) == (material.name, material.source_sha256)
+    assert (again.name, again.source) == (material.name, material.source)
     check_close(again, builtin("red-fabric"), 0.02)
     must_fail(check_close, again, builtin("beige-fabric"), 0.02)
     assert report.psnr_db is None

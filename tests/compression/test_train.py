@@ -116,7 +116,7 @@ def test_looking_up_cell_centres_gives_the_cells(small_table, clusters):
     """With 8 or 16 bits an index must not wrap where it is multiplied."""
     material, _ = train(small_table, TrainOptions(clusters=clusters, epochs=1, alpha=0.001))
     assert material.index.max() == clusters - 1
-    assert np.array_equal(BrdfTable.sample(material, SMALL).values, material.values)
+    assert np.array_equal(BrdfTable.sampled(material, SMALL).values, material.values)
 
 
 def test_any_brdf_can_be_trained_on(small_table):
@@ -124,7 +124,7 @@ def test_any_brdf_can_be_trained_on(small_table):
     first, _ = train(small_table, options)
     again, _ = train(first, options)
     assert np.array_equal(again.values, first.values)
-    assert again.source_sha256 != small_table.source_sha256  # that of its direct source
+    assert again.source.sha256 != small_table.source.sha256  # that of its direct source
 
 
 def test_values_below_the_horizon_do_not_matter(small_table):

@@ -17,6 +17,7 @@ from sommerl.factored.material import FactoredBrdf
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
 from sommerl.reflectance.arrays import split
 from sommerl.reflectance.half_diff import spherical
+from sommerl.reflectance.origin import Source
 from sommerl.render.bsdf import upload
 from sommerl.render.llvm import mitsuba
 from sommerl.sampling.lawrence import LawrenceSampler
@@ -142,12 +143,12 @@ def check_same_on_both_sides(table):
 
 def test_a_table_of_it_is_the_mean_of_both_orders():
     """A reciprocal lattice would else hold one order on one side of the viewer's plane, and the other on the other."""
-    check_same_on_both_sides(BrdfTable.sample(made(), Lattice(20, 20, 40)))
+    check_same_on_both_sides(BrdfTable.sampled(made(), Lattice(20, 20, 40)))
 
     class OneOrder(FactoredBrdf):
         reciprocal = True
 
-    must_fail(check_same_on_both_sides, BrdfTable.sample(OneOrder(*arrays(made())), Lattice(20, 20, 40)))
+    must_fail(check_same_on_both_sides, BrdfTable.sampled(OneOrder(*arrays(made())), Lattice(20, 20, 40)))
 
 
 def check_follows(sampler):
@@ -216,9 +217,9 @@ def test_the_same_every_time():
 
 def test_a_name_and_a_source_stay():
     table = lambertian_table(0.5)
-    table.source_sha256 = "ab" * 32
+    table.source = Source("ab" * 32)
     material = factor(table, FEW)
-    assert (material.name, material.source_sha256) == (table.name, "ab" * 32)
+    assert (material.name, material.source.sha256) == (table.name, "ab" * 32)
 
 
 @pytest.mark.parametrize("name", ["lobes", "terms"])

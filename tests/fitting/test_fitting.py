@@ -44,7 +44,7 @@ def check_recovered(found, truth):
 @pytest.mark.parametrize("model", SPECULAR)
 def test_a_table_of_known_parameters_gives_them_back(model, specular):
     truth = known(model, specular)
-    table = BrdfTable.sample(truth, COARSE)
+    table = BrdfTable.sampled(truth, COARSE)
     found = fit(table, model, FitOptions(lobes=1 + specular, sampling="lattice", loss="l2"))
     check_recovered(found, truth)
     must_fail(check_recovered, found, known(model, specular, seed=1))
@@ -162,7 +162,7 @@ def test_same_options_same_fit():
 
 
 def test_a_compressed_material_and_its_table_alike():
-    table = BrdfTable.sample(builtin("red-fabric"), COARSE)
+    table = BrdfTable.sampled(builtin("red-fabric"), COARSE)
     material, _ = train(table, TrainOptions(clusters=64, epochs=3))
     options = FitOptions(sampling="lattice", starts=4)
     one, other = (fit(brdf, "ward", options) for brdf in (table, material))

@@ -35,7 +35,7 @@ CALLS = {
 
 
 def material(lattice, clusters, interpolation):
-    table = BrdfTable.sample(builtin("purple-paint"), lattice)
+    table = BrdfTable.sampled(builtin("purple-paint"), lattice)
     return train(table, TrainOptions(clusters=clusters, epochs=2))[0].with_interpolation(interpolation)
 
 

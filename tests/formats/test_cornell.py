@@ -33,7 +33,7 @@ def test_a_white_lambertian(tmp_path):
     table = load(written(tmp_path / "x.brdf", content()))
     assert np.allclose(table.eval(A, B), 0.2, rtol=1e-6)
     assert table.facts["samples"] == 40
-    assert len(table.source_sha256) == 64
+    assert len(table.source.sha256) == 64
 
 
 def test_colours(tmp_path):

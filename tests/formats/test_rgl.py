@@ -81,11 +81,11 @@ def test_near_grazing_it_stays_finite(tmp_path):
     assert np.isfinite(brdf.eval(grazing, grazing * [-1, 1, 1])).all()
     assert brdf.facts["cells_near_grazing"] > 10_000
     assert rgl.read(tmp_path / "x.bsdf", reciprocal=False).facts["cells_near_grazing"] < 10_000
-    assert BrdfTable.sample(brdf).cells_clamped == 0
+    assert BrdfTable.sampled(brdf).cells_clamped == 0
 
 
 def check_counts(brdf, cells, energy):
-    table = BrdfTable.sample(brdf)
+    table = BrdfTable.sampled(brdf)
     found = {"cells_clamped": table.cells_clamped, "energy_clamped": table.energy_clamped}
     assert found == {key: brdf.facts[key] for key in found}
     assert (found["cells_clamped"], found["energy_clamped"]) == (cells, pytest.approx(energy, rel=1e-6))
@@ -109,8 +109,8 @@ def test_a_negative_number_in_one_order_is_not_counted_if_the_mean_is_none(tmp_p
     rgb = np.full((1, 4, 3, 5, 5), 0.3, np.float32)
     rgb[0, 3, 1] = -0.001
     brdf = load(written(tmp_path / "x.bsdf", content(rgb=rgb)))
-    table = BrdfTable.sample(brdf)
-    raw = BrdfTable.sample(rgl.read(tmp_path / "x.bsdf", reciprocal=False))
+    table = BrdfTable.sampled(brdf)
+    raw = BrdfTable.sampled(rgl.read(tmp_path / "x.bsdf", reciprocal=False))
     assert 0 <= table.cells_clamped == raw.cells_clamped < MERL.above_horizon.sum() / 2
 
 

@@ -7,6 +7,7 @@ from helpers import compact_material, must_fail, tool
 from shader_programs import CASES, COMPACT, A, B, compact, material, run, validate
 
 from sommerl import BrdfTable, Lattice, SomManBrdf, builtin
+from sommerl.compression.palette import GainsAndShapes
 from sommerl.formats.shader import source as shader
 from sommerl.system.errors import FormatError
 
@@ -33,9 +34,7 @@ def test_compact_materials_are_the_same_in_the_header(tmp_path, case):
     shader.write(brdf, tmp_path / "x.h")
     found = run(tmp_path, "double")
     check_like_python(brdf, found)
-    broken = SomManBrdf(
-        brdf.lut, brdf.index, brdf.lattice, gains=1.001 * brdf.gains, gain_index=brdf.gain_index, scale=0.04, name="x"
-    )
+    broken = SomManBrdf(GainsAndShapes(1.001 * brdf.palette.gains, brdf.lut, 0.04), brdf.index, brdf.lattice, name="x")
     must_fail(check_like_python, broken, found)
 
 
@@ -218,5 +217,5 @@ def test_names():
 
 def test_a_table_is_refused(tmp_path):
     with pytest.raises(FormatError, match="expected a compressed material"):
-        shader.write(BrdfTable.sample(builtin("nickel"), Lattice(9, 7, 11)), tmp_path / "x.h")
+        shader.write(BrdfTable.sampled(builtin("nickel"), Lattice(9, 7, 11)), tmp_path / "x.h")
     assert not list(tmp_path.iterdir())

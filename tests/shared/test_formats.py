@@ -60,7 +60,7 @@ def psnr(reference, candidate):
 
 
 def test_rgl_as_a_table():
-    found = [psnr(source, BrdfTable.sample(source)) for source in map(load, RGL)]
+    found = [psnr(source, BrdfTable.sampled(source)) for source in map(load, RGL)]
     assert statistics.mean(found) >= 50
     assert min(found) >= 36
 
@@ -85,6 +85,6 @@ def test_cornell(name):
 
 def test_neural_fits_are_the_stand_ins(stand_in):
     table = load(stand_in("nickel"))
-    network = BrdfTable.sample(load(f"{DATA / 'nbrdf' / 'merl.npz'}:nickel"))
+    network = BrdfTable.sampled(load(f"{DATA / 'nbrdf' / 'merl.npz'}:nickel"))
     above = table.lattice.above_horizon
     assert np.allclose(network.values[above], table.values[above], rtol=1e-6, atol=1e-9)

@@ -7,18 +7,17 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ..compression.material import SomManBrdf
-from ..formats.load import interpolated, load
-from ..reflectance.brdf import Brdf, OnLattice
-from ..reflectance.cells import INTERPOLATIONS
+from ..formats.load import load
+from ..reflectance.brdf import Brdf
 from ..reflectance.distance import table_metrics
+from ..reflectance.lattice import INTERPOLATIONS
 from ..reflectance.table import BrdfTable
 from ..render.compare import compare_on_sphere
 from ..render.images import side_by_side, write_image
 from . import console
 from .checks import check_output, check_rendering, environment_of
 from .parser import command, rendering_options
-from .rows import image_rows, label, lookup, table_rows
+from .rows import image_rows, label, table_rows
 
 
 def arguments(add: Any) -> None:
@@ -63,7 +62,7 @@ def compare(options: Namespace) -> dict[str, Any]:
     if options.output:
         result["image"] = str(options.output)
     if not options.json:
-        lookups = dict.fromkeys((lookup(reference), lookup(candidate)))
+        lookups = dict.fromkeys((reference.lookup, candidate.lookup))
         rows = {"lookup": " against ".join(lookups)} | image_rows(comparison.metrics) | table_rows(metrics)
         console.print_rows(f"{options.reference} against {options.candidate}", rows)
     return result
@@ -74,16 +73,15 @@ def alike(reference: Brdf, candidate: Brdf, asked: Any) -> tuple[Brdf, Brdf]:
 
     def adapted(brdf: Brdf, other: Brdf) -> Brdf:
         if asked:
-            return interpolated(brdf, asked)
-        if isinstance(brdf, BrdfTable) and isinstance(other, SomManBrdf) and other.grid == brdf.lattice:
-            return brdf.with_interpolation(other.interpolation)
-        return brdf
+            return brdf.with_interpolation(asked)
+        on_same_cells = brdf.grid is not None and brdf.grid == other.grid
+        return brdf.with_interpolation(other.lookup) if other.compressed and on_same_cells else brdf
 
     return adapted(reference, candidate), adapted(candidate, reference)
 
 
 def table_distance(reference: Brdf, candidate: Brdf) -> dict[str, float]:
     """How far two are apart at the cell centres of one lattice: the reference's, the candidate's or MERL's."""
-    lattices = [brdf.grid for brdf in (reference, candidate) if isinstance(brdf, OnLattice) and brdf.grid]
-    first, second = (BrdfTable.sample(brdf, *lattices[:1]) for brdf in (reference, candidate))
+    lattices = [brdf.grid for brdf in (reference, candidate) if brdf.grid]
+    first, second = (BrdfTable.sampled(brdf, *lattices[:1]) for brdf in (reference, candidate))
     return asdict(table_metrics(first.values, second.values, first.lattice))

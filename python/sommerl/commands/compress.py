@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, get_args
@@ -17,6 +16,7 @@ from ..compression.smrl import file as smrl
 from ..formats.load import load, load_table
 from ..reflectance.brdf import Brdf
 from ..reflectance.distance import table_metrics
+from ..reflectance.info import Counts
 from ..reflectance.table import BrdfTable
 from ..render.compare import judge_on_sphere
 from ..render.environment import default_environment
@@ -25,7 +25,7 @@ from ..system.errors import MaterialError, MissingDependencyError, OptionError, 
 from . import console
 from .checks import check_output, stem
 from .parser import command
-from .rows import clamped, describe, fact_rows, origin_rows, table_rows
+from .rows import describe, fact_rows, origin_rows, table_rows
 
 DEFAULTS = TrainOptions()
 
@@ -158,11 +158,11 @@ def compact_one(brdf: Brdf, output: Path, options: CompactOptions, quiet: bool) 
         material, report = search.compress(brdf, options, quality=_judge(brdf, options), progress=advance)
     written = smrl.save(material, output)
     result = describe(material, written) | {"options": asdict(options), "psnr_object_db": report.psnr_db}
-    counted = clamped(brdf)
-    result |= {"seconds": report.seconds, "output": str(output), **counted}
+    counts = brdf.counts
+    result |= {"seconds": report.seconds, "output": str(output), **asdict(counts)}
     result |= dict.fromkeys(("epochs", "quantisation_error", "units_dropped"))
     if not quiet:
-        console.print_rows(f"{material.name} → {output}", compact_rows(material, written, report, counted))
+        console.print_rows(f"{material.name} → {output}", compact_rows(material, written, report, counts))
     return result
 
 
@@ -184,7 +184,7 @@ def trained(table: BrdfTable, options: TrainOptions) -> tuple[SomManBrdf, TrainR
     metrics = table_metrics(table.values, material.values, table.lattice)
     measured = asdict(metrics) | {"quantisation_error": report.quantisation_error[-1]}
     material.metrics = {name: _rounded(value) for name, value in measured.items()}
-    facts = table.facts | (clamped(table) if table.cells_clamped else {})
+    facts = table.facts | (asdict(table.counts) if table.cells_clamped else {})
     if facts:
         material.options["source_facts"] = {name: _rounded(value) for name, value in facts.items()}
     return material, report
@@ -209,17 +209,15 @@ def compression_rows(material: SomManBrdf, bytes_disk: int, report: TrainReport)
     return rows | origin_rows(material) | fact_rows(material.facts) | {"training": f"{report.seconds:.1f} s"}
 
 
-def compact_rows(
-    material: SomManBrdf, bytes_disk: int, report: CompactReport, counted: Mapping[str, Any]
-) -> dict[str, str]:
-    """The same of the preset compact. counted: what `clamped` says of the source."""
+def compact_rows(material: SomManBrdf, bytes_disk: int, report: CompactReport, counts: Counts) -> dict[str, str]:
+    """The same of the preset compact. counts: of the source."""
     rows = {
         "nodes": str(material.lattice.size),
-        "palette": f"{len(material.gains)} gains, {len(material.lut)} shapes",
+        "palette": f"{material.clusters - len(material.lut)} gains, {len(material.lut)} shapes",
         "PSNR, object, on a sphere": console.decibels(report.psnr_db) if report.psnr_db is not None else "not measured",
         "size in memory": console.size(material.bytes_memory),
         "size on disk": console.size(bytes_disk),
     }
-    if counted["cells_clamped"]:
-        rows |= fact_rows(counted)
+    if counts.cells_clamped:
+        rows |= fact_rows(asdict(counts))
     return rows | origin_rows(material) | {"time": f"{report.seconds:.1f} s"}

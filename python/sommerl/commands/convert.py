@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +18,14 @@ from ..formats.shader import source as shader
 from ..models.builtin import NAMES, builtin_table
 from ..plots import coverage
 from ..reflectance.brdf import Brdf
+from ..reflectance.info import Counts
 from ..reflectance.table import BrdfTable
 from ..system.errors import OptionError
 from . import console
 from .checks import check_output
 from .compress import compress_one, trained
 from .parser import command
-from .rows import UNKNOWN, clamped, clamped_text, fact_rows
+from .rows import clamped_text, fact_rows
 
 EXTENSIONS = {
     ".smrl": "Sommerl, compressed with the defaults of compress if need be",
@@ -49,10 +51,10 @@ def convert(options: Namespace) -> dict[str, Any]:
     else:
         written = _write(brdf, options, extension)
         size = output.stat().st_size if output.is_file() else None  # of what went through a pipe
-        counted = UNKNOWN if extension in SNIPPETS else clamped(written)
-        result = {"output": str(output), "bytes_disk": size, **counted}
+        counts = Counts() if extension in SNIPPETS else written.counts
+        result = {"output": str(output), "bytes_disk": size, **asdict(counts)}
         if not options.json:
-            told = f", cells clamped to 0: {clamped_text(counted)}" if counted["cells_clamped"] else ""
+            told = f", cells clamped to 0: {clamped_text(counts)}" if counts.cells_clamped else ""
             written_as = "through a pipe" if size is None else console.size(size)
             console.say(f"{written.name} → {output} ({written_as}{told})")
     if not options.json:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from argparse import Namespace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from ..formats.load import load
 from . import console
 from .checks import check_output
 from .parser import command
-from .rows import clamped, describe, fact_rows, origin_rows, text
+from .rows import describe, fact_rows, origin_rows, text
 
 DEFAULTS = FactorOptions()
 
@@ -39,7 +40,7 @@ def factor(options: Namespace) -> dict[str, Any]:
         material = factored(brdf, chosen, progress=advance)
     seconds = time.perf_counter() - started
     written = fbrdf.save(material, options.output)
-    known = describe(material, written) | clamped(brdf)
+    known = describe(material, written) | asdict(brdf.counts)
     if not options.json:
         rows = {
             "lobes × terms": text(known["terms"]),
@@ -47,7 +48,7 @@ def factor(options: Namespace) -> dict[str, Any]:
             "size on disk": console.size(written),
             **fact_rows(known["facts"]),
             **origin_rows(material),
-            **(fact_rows(clamped(brdf)) if known["cells_clamped"] else {}),
+            **(fact_rows(asdict(brdf.counts)) if known["cells_clamped"] else {}),
             "time": f"{seconds:.1f} s",
         }
         console.print_rows(f"{material.name} → {options.output}", rows)

@@ -20,6 +20,7 @@ from ..render.environment import default_environment
 from . import console
 from .checks import check_output
 from .parser import command
+from .rows import lobe_text
 
 DEFAULTS = FitOptions()
 
@@ -115,4 +116,4 @@ def print_fits(title: str, rows: Sequence[Mapping[str, Any]], fits: Sequence[Fit
         table.append([fit.model, *numbers])
     console.print_table(title, columns, table)
     for fit in fits:
-        console.say(fit.model, *(f"  {lobe}" for lobe in fit.brdf.lobes))
+        console.say(fit.model, *(f"  {lobe_text(lobe.as_json())}" for lobe in fit.brdf.lobes))

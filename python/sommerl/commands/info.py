@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from ..formats.load import load
-from ..models.multi_lobe import MultiLobe
+from ..reflectance.info import Counts
 from . import console
 from .parser import command
-from .rows import UNKNOWN, describe, fact_rows, origin_rows, text
+from .rows import describe, fact_rows, lobe_text, origin_rows, text
 
+COUNTS = tuple(asdict(Counts()))
 HIDDEN = ("facts", "lobes", "made_from", "measured_against")  # keys that `info` shows for people in rows of their own
 
 
@@ -28,15 +30,14 @@ def info(options: Namespace) -> dict[str, Any]:
     on_disk = path.stat().st_size if path.is_file() else None
     result = describe(brdf, on_disk)
     if not options.json:
-        apart = (*HIDDEN, *UNKNOWN)
+        apart = (*HIDDEN, *COUNTS)
         shown = {key: value for key, value in result.items() if value not in (None, "", {}) and key not in apart}
         for key in ("bytes_paper", "bytes_memory", "bytes_disk"):
             if key in shown:
                 shown[key] = console.size(shown[key])
-        counted = {key: result[key] for key in UNKNOWN if result["cells_clamped"] is not None}
+        counted = {key: result[key] for key in COUNTS if result["cells_clamped"] is not None}
         rows = {key: text(value) for key, value in shown.items()}
         rows |= fact_rows(counted | (result["facts"] or {})) | origin_rows(brdf)
-        if isinstance(brdf, MultiLobe):
-            rows |= {f"lobe {number}": str(lobe) for number, lobe in enumerate(brdf.lobes, 1)}
+        rows |= {f"lobe {number}": lobe_text(lobe) for number, lobe in enumerate(result["lobes"] or [], 1)}
         console.print_rows(str(options.material), rows)
     return result

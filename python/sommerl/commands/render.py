@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..formats.load import EXTENSIONS, interpolated, load
+from ..formats.load import EXTENSIONS, load
 from ..models.builtin import NAMES
 from ..plots.contact_sheet import captioned, tiled
 from ..reflectance.brdf import Brdf
-from ..reflectance.cells import INTERPOLATIONS
+from ..reflectance.lattice import INTERPOLATIONS
 from ..render.checkpoint import Checkpoint, checkpoint_of, content, content_of
 from ..render.compare import Comparison
 from ..render.frame import Image, Scene
@@ -96,9 +96,9 @@ class Materials:
         if pair.against is not None:
             reference = self._load(pair.against)
             if self._lookup and not pair.given:
-                return interpolated(reference, self._lookup), brdf
+                return reference.with_interpolation(self._lookup), brdf
             return alike(reference, brdf, lookup)
-        brdf = interpolated(brdf, lookup) if lookup else brdf
+        brdf = brdf.with_interpolation(lookup) if lookup else brdf
         return brdf, brdf
 
 

@@ -8,93 +8,53 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import _core
-from ..reflectance.arrays import Array, Triple, gather3, ops
-from ..reflectance.brdf import Buffers, OnLattice
-from ..reflectance.cells import Interpolation, Lattice, checked
-from ..reflectance.nodes import NodeLattice, from_cube_root
+from ..reflectance.arrays import Triple
+from ..reflectance.brdf import Buffers, Native, OnLattice
+from ..reflectance.info import Counts
+from ..reflectance.lattice import AnyLattice, Interpolation
+from ..reflectance.origin import Link, Source
 from ..system.errors import MaterialError
-
-LARGEST = float(np.finfo(np.float32).max)  # renderers calculate in single precision
+from .palette import Palette, Reflectances
 
 
 class SomManBrdf(OnLattice):
     """A material compressed by the paper's method: a lookup finds entries of a palette and blends them.
 
-    The preset `paper` has MERL's lattice of cells, and lut[index[cell]] is f_r. The preset `compact` has a lattice of
-    nodes, and gains[gain_index[node]] · lut[index[node]], gain times shape, is the node's value in the cube-root domain
-    (`nodes.from_cube_root`).
+    The preset `paper` has MERL's lattice of cells and a palette of reflectances, lut[index[cell]]; the preset `compact`
+    has a lattice of nodes, and a palette of gains and shapes. See `palette` for both.
 
-    lut: (M, 3), linear RGB, float64: f_r [1/sr], values that the source holds; or shapes, whose mean is 1.
-    index: unsigned, of the lattice's shape, or (nodes,): the LUT entry of each cell or node. Below the horizon it is
-        not used.
-    gains, gain_index: (G,) and (nodes,), with a NodeLattice alone. scale: of the cube-root domain.
-    name, options, metrics, source_sha256: what was compressed, how, and how well. made_from: what that was made from,
-        if it was a compressed material itself; see `origin`.
+    palette: the entries; an array (M, 3) stands for `Reflectances`.
+    index: the entry of each cell or node, as the palette asks for it.
+    interpolation: the lattice's usual one if None.
+    name, options, metrics: what was compressed, how, and how well. source_sha256, made_from: see `origin.Source`.
 
-    Raises MaterialError if shapes do not fit or an index lies outside the LUT.
+    Raises MaterialError if the parts do not fit, or an index lies outside of the palette.
     """
 
-    compressed_as = "som-man"
+    kind = "som-man"
+    compressed = True
 
     def __init__(
         self,
-        lut: ArrayLike,
+        palette: Palette | ArrayLike,
         index: NDArray[Any],
-        lattice: Lattice | NodeLattice,
+        lattice: AnyLattice,
         *,
         name: str,
         interpolation: Interpolation | None = None,
-        gains: ArrayLike = (),
-        gain_index: NDArray[Any] | None = None,
-        scale: float = 1.0,
         options: Mapping[str, Any] | None = None,
         metrics: Mapping[str, Any] | None = None,
         source_sha256: str = "",
-        made_from: tuple[Mapping[str, str], ...] = (),
+        made_from: tuple[Link, ...] = (),
     ) -> None:
         self.name = name
-        self.lut = np.array(lut, np.float64)
-        self.gains = np.array(gains, np.float64)
+        self.palette = palette if isinstance(palette, Palette) else Reflectances(palette)
         self.lattice = lattice
-        self.scale = float(np.float32(scale))  # as a file holds it
-        self.interpolation = "trilinear" if isinstance(lattice, NodeLattice) else "nearest"
+        self.interpolation = lattice.checked(name, interpolation) if interpolation else lattice.interpolations[0]
         self.options = dict(options or {})
         self.metrics = dict(metrics or {})
-        self.source_sha256 = source_sha256
-        self.made_from = made_from
-        if self.lut.ndim != 2 or self.lut.shape[1] != 3 or not 1 <= len(self.lut) <= 2**16:
-            raise MaterialError(f"{name}: expected a LUT of shape (1 to 65536, 3), found {self.lut.shape}")
-        if not np.isfinite(self.lut).all():
-            raise MaterialError(f"{name}: expected finite LUT entries, found others")
-        if isinstance(lattice, NodeLattice):
-            self._index = self._entries("LUT", index, len(self.lut), np.dtype(np.uint16))
-            gain_index = np.zeros(0, np.uint16) if gain_index is None else gain_index
-            self.gain_index = self._entries("gains", gain_index, len(self.gains), np.dtype(np.uint16))
-            if not (np.isfinite(self.gains).all() and (self.gains >= 0).all() and 0 < self.scale < np.inf):
-                raise MaterialError(f"{name}: expected gains that are not negative, and a positive scale, found others")
-        else:
-            self._index = self._cells(index, lattice)
-        if interpolation:
-            self._interpolate(interpolation)
-
-    def _cells(self, index: NDArray[Any], lattice: Lattice) -> NDArray[Any]:
-        if not ((self.lut >= 0) & (self.lut <= LARGEST)).all():
-            raise MaterialError(f"{self.name}: expected LUT entries from 0 to {LARGEST:.4g}, found others")
-        if index.shape != lattice.shape or index.dtype.kind != "u":
-            found = f"{index.dtype} of shape {index.shape}"
-            raise MaterialError(f"{self.name}: expected an unsigned index of shape {lattice.shape}, found {found}")
-        if index[lattice.above_horizon].max() >= len(self.lut):
-            raise MaterialError(f"{self.name}: expected indices below {len(self.lut)}, found {index.max()}")
-        return lattice.extended(index.astype(np.uint8 if len(self.lut) <= 256 else np.uint16))
-
-    def _entries(self, what: str, index: NDArray[Any], entries: int, dtype: np.dtype[Any]) -> NDArray[Any]:
-        if index.shape != (self.lattice.size,) or index.dtype.kind != "u":
-            found = f"{index.dtype} of shape {index.shape}"
-            raise MaterialError(f"{self.name}: {what}: expected an unsigned index for each node, found {found}")
-        if index.max() >= entries:
-            raise MaterialError(f"{self.name}: {what}: expected indices below {entries}, found {index.max()}")
-        return index.astype(dtype)
+        self.source = Source(source_sha256, made_from)
+        self._index = self.palette.checked(name, index, lattice)
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -102,28 +62,32 @@ class SomManBrdf(OnLattice):
         return dict(self.options.get("source_facts", {}))
 
     @property
+    def counts(self) -> Counts:
+        """Those of what was compressed, as far as the file keeps them."""
+        facts = self.facts
+        return Counts(facts.get("cells_clamped"), facts.get("energy_clamped"))
+
+    @property
     def domain(self) -> str:
         """In which values are stored and blended: "linear" or "cube-root"."""
-        return "cube-root" if isinstance(self.lattice, NodeLattice) else "linear"
+        return self.palette.domain
 
     @property
     def index(self) -> NDArray[Any]:
-        """The LUT entry of each cell, of the lattice's shape, uint8 or uint16, 0 below the horizon; or of each node."""
-        if isinstance(self.lattice, NodeLattice):
+        """The entry of each cell or node, as the palette's class says; 0 for cells below the horizon."""
+        if self.grid is None:
             return self._index
-        return np.where(self.lattice.above_horizon, self._index, self._index.dtype.type(0))
+        return np.where(self.grid.above_horizon, self._index, self._index.dtype.type(0))
 
     @property
-    def grid(self) -> Lattice | None:
-        return None if isinstance(self.lattice, NodeLattice) else self.lattice
-
-    def cells(self) -> tuple[NDArray[Any], NDArray[np.float64]]:
-        return self._index, self.lut
+    def lut(self) -> NDArray[np.float64]:
+        """The palette's LUT: reflectances, or shapes."""
+        return self.palette.lut
 
     @property
     def clusters(self) -> int:
-        """The number of entries of the palette: LUT and gains."""
-        return len(self.lut) + len(self.gains)
+        """The number of entries of the palette."""
+        return self.palette.entries
 
     @property
     def bytes_paper(self) -> int:
@@ -131,46 +95,39 @@ class SomManBrdf(OnLattice):
         return 4 * self.lattice.size + 24 * self.clusters
 
     @property
-    def bytes_memory(self) -> int:
-        """What a lookup reads."""
-        return sum(buffer.nbytes for buffer in self.buffers().values())
+    def values(self) -> NDArray[np.float64]:
+        """f_r [1/sr] of each cell, of the lattice's shape + (3,). Raises MaterialError if the material has nodes."""
+        if self.grid is None:
+            raise MaterialError(f"{self.name}: expected values of cells, found nodes; BrdfTable.of samples them")
+        return self.palette.stored(self._index)
 
     @property
-    def values(self) -> NDArray[np.float64]:
-        """What each cell holds, f_r [1/sr] of the lattice's shape + (3,); or each node, (nodes, 3), in its domain."""
-        values = self.lut[self._index]
-        return values if self.grid else values * self.gains[self.gain_index][:, None]
+    def node_values(self) -> NDArray[np.float64]:
+        """y of each node in the cube-root domain, (nodes, 3). Raises MaterialError if the material has cells."""
+        if self.grid is not None:
+            raise MaterialError(f"{self.name}: expected values of nodes, found cells")
+        return self.palette.stored(self._index)
+
+    def details(self) -> dict[str, Any]:
+        return {
+            "clusters": self.clusters,
+            "lattice": list(self.lattice.shape),
+            "nodes": self.lattice.size if self.grid is None else None,
+            "interpolation": self.interpolation,
+            "domain": self.domain,
+            "bytes_paper": self.bytes_paper,
+            "options": self.options,
+            "metrics": self.metrics,
+        }
 
     def buffers(self) -> dict[str, NDArray[Any]]:
-        buffers: dict[str, NDArray[Any]] = {"index": self._index.reshape(-1), "lut": self.lut.reshape(-1)}
-        if isinstance(self.lattice, NodeLattice):
-            buffers |= {"gain_index": self.gain_index, "gains": self.gains, "scale": np.array(self.scale)}
-            buffers |= self.lattice.buffers()
-        return buffers
+        return self.palette.buffers(self._index) | self.lattice.buffers()
 
     def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
-        gather = ops(wi[0]).gather
-
-        def entry(cell: Array) -> Triple:
-            return gather3(buffers["lut"], gather(buffers["index"], cell))
-
-        def node(number: Array) -> Triple:
-            gain = gather(buffers["gains"], gather(buffers["gain_index"], number))
-            r, g, b = entry(number)
-            return gain * r, gain * g, gain * b
-
-        if isinstance(self.lattice, NodeLattice):
-            return from_cube_root(self.lattice.lookup(wi, wo, node, buffers), wi, wo, buffers["scale"])
-        return self.lattice.lookup(wi, wo, self.interpolation, entry)
-
-    def _found(self, wi: NDArray[np.float64], wo: NDArray[np.float64]) -> NDArray[np.float64]:
-        if not isinstance(self.lattice, NodeLattice):
-            return super()._found(wi, wo)
-        return _core.lookup_nodes(
-            wi, wo, *self.lattice.axes(), self.gains, self.lut, self.gain_index, self._index, self.scale
+        value = self.lattice.lookup(
+            wi, wo, self.interpolation, buffers, lambda number: self.palette.fetch(number, buffers)
         )
+        return self.palette.reflectance(value, wi, wo, buffers)
 
-    def _interpolate(self, interpolation: Interpolation) -> None:
-        if isinstance(self.lattice, NodeLattice) and checked(interpolation) != "trilinear":
-            raise MaterialError(f"{self.name}: expected trilinear interpolation between nodes, found {interpolation}")
-        super()._interpolate(interpolation)
+    def native(self) -> Native:
+        return self.palette.native(self._index, self.lattice, self.interpolation)

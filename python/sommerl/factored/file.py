@@ -58,7 +58,7 @@ def encode(material: FactoredBrdf) -> bytes:
     halves = np.concatenate([part.reshape(-1) for part in (material.lobes, material.rows, material.columns)])
     planes = halves.astype("<f2").view(np.uint8).reshape(-1, 2).T
     stream = sealed_file.deflated(planes.tobytes() + material.scale.astype("<f4").tobytes())
-    head = sealed_file.origin(material.name, material.source_sha256) + TERMS.pack(*material.terms)
+    head = sealed_file.origin(material.name, material.source.sha256) + TERMS.pack(*material.terms)
     return sealed_file.sealed(MAGIC, VERSION, head + stream)
 
 

@@ -65,9 +65,8 @@ def factor(brdf: Brdf, options: FactorOptions | None = None, *, progress: Progre
     f, u, v = (part / np.where(top > 0, top, 1.0) for part, top in zip((f, u, v), tops, strict=True))
     by_lobe = np.moveaxis(f.reshape(ELEVATIONS, 3, -1), 1, 2)
     scale = tops[0][:, None] * tops[1] * tops[2]
-    sha256, made_from = source_of(brdf)
-    material = FactoredBrdf(by_lobe, u, v, scale, name=brdf.name, source_sha256=sha256)
-    material.made_from = made_from
+    material = FactoredBrdf(by_lobe, u, v, scale, name=brdf.name)
+    material.source = source_of(brdf)
     return material
 
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..reflectance.arrays import Array, Triple, gather3, ops
 from ..reflectance.brdf import Brdf, Buffers
 from ..reflectance.distance import asymmetry
+from ..reflectance.origin import Source
 from ..system.errors import MaterialError
 
 ELEVATIONS = 32  # intervals of θ_o, of equal size
@@ -39,7 +40,8 @@ class FactoredBrdf(Brdf):
     scale: a factor for each term [1/sr], (J, K).
     """
 
-    compressed_as = "factored"
+    kind = "factored"
+    compressed = True
 
     def __init__(
         self,
@@ -63,7 +65,7 @@ class FactoredBrdf(Brdf):
             raise MaterialError(f"factors: expected at most {MOST} × {MOST} and {MOST_TERMS} terms, found {terms}")
         if not ((scale >= 0) & (scale <= LARGEST_SCALE)).all():
             raise MaterialError(f"factors: expected scales from 0 to {LARGEST_SCALE:g}, found others")
-        self.name, self.source_sha256 = name, source_sha256
+        self.name, self.source = name, Source(source_sha256)
         self.lobes, self.rows, self.columns = (part.astype(np.float16) for part in (lobes, rows, columns))
         self.scale = scale.astype(np.float32)
 
@@ -84,9 +86,11 @@ class FactoredBrdf(Brdf):
         return {"asymmetry": asymmetry(lambda wi, wo: self.f_r(wi, wo, buffers))}
 
     @property
-    def bytes_memory(self) -> int:
-        """The size of the tables that `f_r` reads [bytes]."""
-        return sum(buffer.nbytes for buffer in self.buffers().values())
+    def lookup(self) -> str:
+        return "factored"
+
+    def details(self) -> dict[str, Any]:
+        return {"terms": list(self.terms)}
 
     def buffers(self) -> dict[str, NDArray[Any]]:
         rows = self.rows * self.scale

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..reflectance.brdf import Brdf, OnLattice
-from ..reflectance.cells import MERL
+from ..reflectance.brdf import Brdf
 from ..reflectance.half_diff import directions
 from ..reflectance.samples import Samples
 from ..system.errors import MaterialError
@@ -59,7 +58,7 @@ def sphere(count: int, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float
 
 def lattice(brdf: Brdf) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The pairs of directions at the centres of all cells above the horizon, (n, 3) each, in random order."""
-    cells = (brdf.grid if isinstance(brdf, OnLattice) else None) or MERL
+    cells = brdf.table_lattice
     chosen = np.flatnonzero(cells.above_horizon)
     order = np.random.Generator(np.random.PCG64(0)).permutation(chosen)
     wi, wo = directions(*(np.broadcast_to(angle, cells.shape).reshape(-1)[order] for angle in cells.angles()))

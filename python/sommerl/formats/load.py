@@ -9,13 +9,11 @@ from pathlib import Path
 
 from ..compression.smrl import file as smrl
 from ..factored import file as fbrdf
-from ..factored.material import FactoredBrdf
 from ..models.builtin import NAMES, builtin
-from ..reflectance.brdf import Brdf, OnLattice
-from ..reflectance.cells import Interpolation
+from ..reflectance.brdf import Brdf
 from ..reflectance.table import BrdfTable
 from ..system import door
-from ..system.errors import FormatError, MaterialError
+from ..system.errors import FormatError
 from . import cornell, fits, hdf5, merl, nbrdf, numpy_files, rgl, samples, tensor, text
 from .names import split_member
 
@@ -90,14 +88,6 @@ BY_NAME: dict[str, tuple[int, Parse]] = {
     ".json": (fits.LARGEST_FILE, fits.parse),
     **dict.fromkeys((".npy", ".npz", ".h5", ".hdf5"), (nbrdf.LARGEST_FILE, nbrdf.parse)),
 }
-
-
-def interpolated(brdf: Brdf, interpolation: Interpolation) -> Brdf:
-    """The same material, looked up in another way. Raises MaterialError if it is a formula, or there is no such way."""
-    if isinstance(brdf, OnLattice):
-        return brdf.with_interpolation(interpolation)
-    kind = "a factored one" if isinstance(brdf, FactoredBrdf) else "a formula"
-    raise MaterialError(f"{brdf.name}: expected a table or a compressed material to look up, found {kind}")
 
 
 def load_table(source: str | Path) -> BrdfTable:

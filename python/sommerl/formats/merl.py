@@ -81,7 +81,7 @@ LARGEST_FILE = max(map(bytes_on_disk, LATTICES.values()))
 def resampled(brdf: Brdf) -> BrdfTable:
     """The BRDF as a table on a lattice of MERL's: itself if it is one, else its values at the centres of the cells."""
     table = BrdfTable.of(brdf)
-    return table if table.lattice in LATTICES.values() else BrdfTable.sample(brdf)
+    return table if table.lattice in LATTICES.values() else BrdfTable.sampled(brdf)
 
 
 def write(table: BrdfTable, path: str | Path) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 from copy import copy
+from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,8 @@ from ..reflectance.brdf import Brdf, Buffers
 from ..reflectance.cells import MERL
 from ..reflectance.distance import asymmetry
 from ..reflectance.half_diff import TWO_PI, directions
+from ..reflectance.info import Counts
+from ..reflectance.origin import Source
 from ..reflectance.table import BrdfTable
 from ..system import door
 from ..system.errors import FormatError
@@ -49,6 +52,8 @@ class RglBrdf(Brdf):
     the division would turn into peaks without bound.
     """
 
+    kind = "measurement"
+
     def __init__(
         self,
         theta_i: NDArray[Any],
@@ -64,7 +69,7 @@ class RglBrdf(Brdf):
     ) -> None:
         self.name = name
         self._reciprocal, self._clamped = reciprocal, reciprocal
-        self.source_sha256 = source_sha256
+        self.source = Source(source_sha256)
         self._theta_i = np.asarray(theta_i, np.float64)
         self._shapes = {"vndf": vndf.shape[1:], "rgb": rgb.shape[2:], "ndf": ndf.shape, "sigma": sigma.shape}
         self._jacobian = jacobian
@@ -83,6 +88,15 @@ class RglBrdf(Brdf):
     def reciprocal(self) -> bool:
         return self._reciprocal
 
+    @property
+    def lookup(self) -> str:
+        return "measurement"
+
+    @property
+    def counts(self) -> Counts:
+        """Of MERL's cells, those that the mean of both orders sets to 0, and the share of their energy."""
+        return self._cut
+
     def buffers(self) -> dict[str, NDArray[Any]]:
         return self._buffers
 
@@ -93,12 +107,10 @@ class RglBrdf(Brdf):
         return other
 
     @cached_property
-    def _cut(self) -> dict[str, Any]:
-        """How many of MERL's cells, and which share of their energy, the mean of both orders sets to 0."""
+    def _cut(self) -> Counts:
         if not (self._clamped and (self._buffers["rgb"] < 0).any()):
-            return {"cells_clamped": 0, "energy_clamped": 0.0}
-        table = BrdfTable.sample(self)
-        return {"cells_clamped": table.cells_clamped, "energy_clamped": table.energy_clamped}
+            return Counts(0, 0.0)
+        return BrdfTable.sampled(self).counts
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -113,7 +125,7 @@ class RglBrdf(Brdf):
         near = MERL.above_horizon & (divided < SMALLEST_COSINE)
         touched = np.any(self.f_r(*directions(*(angle[near] for angle in MERL.angles())), self._buffers), axis=0)
         known = {"reciprocal": self.reciprocal, "asymmetry": one_sided, "cells_near_grazing": int(touched.sum())}
-        return known | self._cut
+        return known | asdict(self._cut)
 
     def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
         forward = self._raw(wo, wi, buffers)

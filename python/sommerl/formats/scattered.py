@@ -83,7 +83,7 @@ def to_table(samples: Samples, *, name: str, source_sha256: str | None = None, l
         fitted = BrdfTable(np.maximum(values, 0.0), coarse, name=name)
     except MaterialError as error:
         raise FormatError("expected a positive reflectance in some sample, found none") from error
-    fine = BrdfTable.sample(fitted, lattice)
+    fine = BrdfTable.sampled(fitted, lattice)
     table = ScatteredTable(fine.values, lattice, name=name, source_sha256=source_sha256)
     table.cells_clamped, table.energy_clamped = _clamped(coarse, values, table)
     near = np.zeros(coarse.shape, bool)
@@ -112,7 +112,7 @@ def _clamped(coarse: Lattice, values: NDArray[np.float64], table: BrdfTable) -> 
         return 0, 0.0
     size = np.where(changed & np.isfinite(values), np.minimum(np.abs(values), LARGEST), 0.0)
     touched, lost = (
-        BrdfTable.sample(BrdfTable(each, coarse), table.lattice).values if each.any() else np.zeros_like(table.values)
+        BrdfTable.sampled(BrdfTable(each, coarse), table.lattice).values if each.any() else np.zeros_like(table.values)
         for each in (changed.astype(np.float64), size)
     )
     cells = (touched > 0).any(axis=-1) & table.lattice.above_horizon

@@ -46,7 +46,7 @@ def builtin_table(name: str, *, noise: int | None = None, lattice: Lattice = MER
         log-normal factor, the same for all channels, with mean 1 and σ = 0.12 + 0.5 (1 - cos θ)⁴, where θ is the larger
         of θ_i and θ_o.
     """
-    table = BrdfTable.sample(builtin(name), lattice)
+    table = BrdfTable.sampled(builtin(name), lattice)
     if noise is None:
         return table
     cosine = np.clip(np.minimum(*lattice.cosines()), 0, 1)

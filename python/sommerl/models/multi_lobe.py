@@ -78,11 +78,6 @@ class Lobe:
     def as_json(self) -> dict[str, Any]:
         return {"family": self.family.name, "albedo": list(self.albedo), **self.shape}
 
-    def __str__(self) -> str:
-        numbers = [f"albedo {' '.join(f'{value:.4g}' for value in self.albedo)}"]
-        numbers += [f"{key} {value:.4g}" for key, value in self.shape.items()]
-        return f"{self.family.name}: {', '.join(numbers)}"
-
     @property
     def exponent(self) -> float:
         """How narrow the lobe is: the exponent of a Blinn-Phong lobe of about the same width; 0 for a diffuse lobe."""
@@ -106,6 +101,9 @@ class MultiLobe(Brdf):
     def buffers(self) -> dict[str, NDArray[Any]]:
         # In a buffer and not in the formula, so that materials with the same families share one compiled kernel.
         return {"parameters": np.array([x for lobe in self.lobes for x in (*lobe.albedo, *lobe.values)])}
+
+    def details(self) -> dict[str, Any]:
+        return {"lobes": [lobe.as_json() for lobe in self.lobes]}
 
     def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
         angles, parameters, gather = Angles(wi, wo), buffers["parameters"], ops(wi[0]).gather

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..reflectance.brdf import Brdf, OnLattice
+from ..reflectance.brdf import Brdf
 from ..reflectance.cells import HALF_PI, Lattice
 from ..reflectance.half_diff import TWO_PI, half_diff, spherical
 from ..system.errors import MaterialError
@@ -42,7 +42,7 @@ def hits(ax: Any, material: Brdf) -> None:
     MERL's lattice 180, in φ_d); the bars add up to all pairs. See `hit_counts`. Raises MaterialError for a material
     that is not on a lattice of cells.
     """
-    lattice = material.grid if isinstance(material, OnLattice) else None
+    lattice = material.grid
     if lattice is None:
         raise MaterialError(f"{material.name}: hits are drawn only of materials on a lattice of cells, which it is not")
     counts = hit_counts(lattice)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compression.material import SomManBrdf
+from ..compression.palette import GainsAndShapes, Palette
 from ..reflectance.brdf import Brdf
 from ..system.errors import MaterialError
 from .page import number
@@ -27,20 +28,22 @@ def palette(ax: Any, material: Brdf) -> None:
     Raises MaterialError for a material that has no palette.
     """
     compressed = _compressed(material)
-    f_r, shown = _products(compressed) if compressed.grid is None else _swatches(compressed)
+    entries = compressed.palette
+    if isinstance(entries, GainsAndShapes):
+        f_r, shown = _products(entries, compressed.index)
+        title = f"palette: {shown.sum()} products in use"
+        ax.set(xlabel=f"{len(entries.lut)} shapes", ylabel=f"{len(entries.gains)} gains")
+    else:
+        f_r, shown = _swatches(entries)
+        means = f_r[shown].mean(axis=-1)
+        title = f"palette: {len(entries.lut)} entries, {number(means.min())} to {number(means.max())}/sr"
     tone = Tone.of(f_r[shown])
     pixels = np.zeros((*shown.shape, 4), np.uint8)
     pixels[shown, :3] = tone.srgb8(f_r[shown])
     pixels[..., 3] = np.where(shown, 255, 0)
     ax.imshow(pixels, aspect="auto", interpolation="nearest")
     ax.set_facecolor("0.6")  # on white, white products would look like unused ones
-    ax.set(xticks=[], yticks=[])
-    if compressed.grid is None:
-        ax.set(xlabel=f"{len(compressed.lut)} shapes", ylabel=f"{len(compressed.gains)} gains")
-        ax.set_title(f"palette: {shown.sum()} products in use")
-    else:
-        low, high = f_r[shown].mean(axis=-1).min(), f_r[shown].mean(axis=-1).max()
-        ax.set_title(f"palette: {len(compressed.lut)} entries, {number(low)} to {number(high)}/sr")
+    ax.set(xticks=[], yticks=[], title=title)
 
 
 def usage(ax: Any, material: Brdf) -> None:
@@ -51,17 +54,16 @@ def usage(ax: Any, material: Brdf) -> None:
     up to the number of cells or nodes. Raises MaterialError for a material that has no palette.
     """
     compressed = _compressed(material)
-    index = compressed.index
-    if compressed.grid is None:
-        what = "nodes"
+    entries, index = compressed.palette, compressed.index
+    if isinstance(entries, GainsAndShapes):
+        what, (gains, shapes) = "nodes", index
         series = {
-            "shapes": np.bincount(index, minlength=len(compressed.lut)),
-            "gains": np.bincount(compressed.gain_index, minlength=len(compressed.gains)),
+            "shapes": np.bincount(shapes, minlength=len(entries.lut)),
+            "gains": np.bincount(gains, minlength=len(entries.gains)),
         }
     else:
-        what = "cells"
-        counts = np.bincount(index[compressed.grid.above_horizon], minlength=len(compressed.lut))
-        series = {"entries": counts[_order(compressed)]}
+        what, above = "cells", compressed.table_lattice.above_horizon
+        series = {"entries": np.bincount(index[above], minlength=len(entries.lut))[_order(entries)]}
     for n, (name, counts) in enumerate(series.items()):
         ax.stairs(counts, np.arange(len(counts) + 1), fill=n == 0, color=f"C{n}", label=name, linewidth=1.2)
     ax.set_yscale("log")
@@ -80,25 +82,25 @@ def _compressed(material: Brdf) -> SomManBrdf:
     return material
 
 
-def _order(material: SomManBrdf) -> NDArray[np.int64]:
+def _order(palette: Palette) -> NDArray[np.int64]:
     """The numbers of the LUT's entries, from dark to bright."""
-    return np.argsort(material.lut.sum(axis=1), kind="stable")
+    return np.argsort(palette.lut.sum(axis=1), kind="stable")
 
 
-def _swatches(material: SomManBrdf) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _swatches(palette: Palette) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """f_r of each swatch of a material on cells, and where there is a swatch."""
-    entries = len(material.lut)
+    entries = len(palette.lut)
     columns = int(np.ceil(np.sqrt(entries)))
     rows = -(-entries // columns)
     f_r = np.zeros((rows * columns, 3))
-    f_r[:entries] = material.lut[_order(material)]
+    f_r[:entries] = palette.lut[_order(palette)]
     return f_r.reshape(rows, columns, 3), (np.arange(rows * columns) < entries).reshape(rows, columns)
 
 
-def _products(material: SomManBrdf) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _products(palette: GainsAndShapes, index: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """The same for a material on nodes: the products of gains and shapes."""
-    gains = np.argsort(-material.gains, kind="stable")
-    used = np.zeros((len(gains), len(material.lut)), np.bool_)
-    used[material.gain_index, material.index] = True
-    y = np.maximum(material.gains[:, None, None] * material.lut, 0.0)
-    return (material.scale * y**3)[gains], used[gains]
+    gains = np.argsort(-palette.gains, kind="stable")
+    used = np.zeros((len(gains), len(palette.lut)), np.bool_)
+    used[tuple(index)] = True
+    y = np.maximum(palette.gains[:, None, None] * palette.lut, 0.0)
+    return (palette.scale * y**3)[gains], used[gains]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..compression.material import SomManBrdf
-from ..reflectance.brdf import Brdf, OnLattice
+from ..reflectance.brdf import Brdf
 from ..reflectance.cells import Lattice
 from ..system.errors import OptionError
 from .curves import lobes, theta_h_slices
@@ -42,7 +42,7 @@ def _has_palette(brdf: Brdf) -> bool:
 
 
 def _has_cells(brdf: Brdf) -> bool:
-    return isinstance(brdf, OnLattice) and brdf.grid is not None
+    return brdf.grid is not None
 
 
 KINDS = {
@@ -84,7 +84,7 @@ def _lattices(materials: list[Material]) -> list[Material]:
     """One material for each lattice: hits are the same for all materials on one lattice."""
     found: dict[Lattice | None, Material] = {}
     for label, one in materials:
-        found.setdefault(one.grid if isinstance(one, OnLattice) else None, (label, one))
+        found.setdefault(one.grid, (label, one))
     return list(found.values())
 
 

@@ -10,27 +10,39 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from copy import copy
-from typing import Any, ClassVar, Self
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import _core
+from ..system.errors import MaterialError
 from .arrays import Triple, split
-from .cells import MERL, Interpolation, Lattice, checked
+from .cells import MERL, Lattice
+from .info import Counts, Info
+from .lattice import AnyLattice, Interpolation
+from .origin import Source, measured_against
+
+if TYPE_CHECKING:
+    from ..sampling.half_vector import HalfVectorSampler
 
 Buffers = Mapping[str, Any]
+Vectors = NDArray[np.float64]
 LARGEST = float(np.finfo(np.float32).max)  # renderers calculate in single precision
 AT_ONCE = 2**16  # pairs that a formula is evaluated for: bounds memory, and stays in the cache
 
 
 class Brdf(ABC):
-    """An isotropic BRDF. A subclass gives one formula, which runs on NumPy and on Dr.Jit arrays."""
+    """An isotropic BRDF. A subclass gives one formula, which runs on NumPy and on Dr.Jit arrays.
 
+    name: for people. source: of its data. file_sha256: of the file that a compressed material was read from, or "".
+    """
+
+    kind: ClassVar[str] = "model"  #: "table", "som-man", "factored", "measurement" or "model"
+    compressed: ClassVar[bool] = False  #: whether it was made from another BRDF, to take less space
     name: str
-    compressed_as: ClassVar[str] = ""  #: the kind of a compressed material; see `origin`
-    file_sha256: str = ""  #: of the file that a compressed material was read from
-    made_from: tuple[Mapping[str, str], ...] = ()  #: what was known of its source; see `origin`
+    source: Source = Source()
+    file_sha256: str = ""
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -38,9 +50,60 @@ class Brdf(ABC):
         return {}
 
     @property
+    def counts(self) -> Counts:
+        """What had to be changed in the data."""
+        return Counts()
+
+    @property
     def reciprocal(self) -> bool:
         """Whether both orders of the directions give the same."""
         return True
+
+    @property
+    def lookup(self) -> str:
+        """How a value is found: "formula", "factored", "measurement", or how a table is interpolated."""
+        return "formula"
+
+    @property
+    def grid(self) -> Lattice | None:
+        """The lattice of cells that hold its values; None if it has none."""
+        return None
+
+    @property
+    def table_lattice(self) -> Lattice:
+        """The cells of a table that is made of it: its own, or MERL's if it has none."""
+        return MERL if self.grid is None else self.grid
+
+    @property
+    def bytes_memory(self) -> int:
+        """The bytes that `f_r` reads from."""
+        return sum(buffer.nbytes for buffer in self.buffers().values())
+
+    def info(self) -> Info:
+        """What the material is; the fields of `Info` that a kind of material does not have are None."""
+        facts = self.facts
+        return Info(
+            kind=self.kind,
+            name=self.name,
+            bytes_memory=self.bytes_memory,
+            source_sha256=self.source.sha256 or None,
+            cells_clamped=self.counts.cells_clamped,
+            energy_clamped=self.counts.energy_clamped,
+            made_from=[dict(link) for link in self.source.chain()] or None,
+            measured_against=measured_against(self),
+            facts=facts or None,
+            **self.details(),
+        )
+
+    def details(self) -> dict[str, Any]:
+        """The fields of `info` that this kind of material has beyond those of every BRDF."""
+        return {}
+
+    def with_interpolation(self, interpolation: str) -> Brdf:
+        """The same values, looked up in another way. Raises MaterialError if there is no such way, or only one."""
+        raise MaterialError(
+            f"{self.name}: expected a table or a compressed material to interpolate, found another ({self.lookup})"
+        )
 
     def unclamped(self) -> Brdf:
         """The same before anything was set to 0 that no material reflects, as negative numbers of measurements: itself,
@@ -61,7 +124,7 @@ class Brdf(ABC):
         buffers: those of `buffers()`, as they are or uploaded to the device that holds `wi` and `wo`.
         """
 
-    def eval(self, wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float64]:
+    def eval(self, wi: ArrayLike, wo: ArrayLike) -> Vectors:
         """f_r [1/sr], linear RGB, shape (..., 3), for unit directions `wi` and `wo` of shape (..., 3).
 
         Shapes broadcast. NaN where a component of either is NaN or infinite; else 0 where either is not above the
@@ -82,61 +145,95 @@ class Brdf(ABC):
             result[above] = finite(np.concatenate(values))
         return result
 
-    def eval_both_orders(self, wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float64]:
+    def eval_both_orders(self, wi: ArrayLike, wo: ArrayLike) -> Vectors:
         """The mean of f_r for both orders of the directions: what a reciprocal representation can hold of it."""
         f_r = self.eval(wi, wo)
         return f_r if self.reciprocal else 0.5 * (f_r + self.eval(wo, wi))
+
+    def sample(self, wo: ArrayLike, u: ArrayLike) -> tuple[Vectors, Vectors, Vectors]:
+        """Draws directions to the light `wi`, likelier where the BRDF reflects more.
+
+        wo: directions to the viewer; u: uniform random numbers from 0 to 1; both of shape (..., 3).
+        Returns wi (..., 3), their densities [1/sr] (...), and their weights f_r cos θ_i / density (..., 3), whose mean
+        is the albedo. Density and weight are 0 where nothing was drawn; all three are NaN where `wo` or `u` is not
+        finite. Raises ValueError for other shapes, for what are not real numbers, and for `u` outside of [0, 1].
+        """
+        return self.sampler.sample(wo, u)
+
+    def pdf(self, wi: ArrayLike, wo: ArrayLike) -> Vectors:
+        """The density [1/sr] with which `sample` draws `wi` for `wo`, shape (...).
+
+        Shapes, NaN and errors are as in `eval`.
+        """
+        return self.sampler.pdf(wi, wo)
+
+    def albedo(self, theta: ArrayLike) -> Vectors:
+        """The directional-hemispherical reflectance, ∫ f_r cos θ_i dω_i: the share of even light that goes to a viewer
+        at the polar angle `theta` [rad], from 0 to π/2, of any shape (...).
+
+        Linear RGB, shape (..., 3), by quadrature. NaN where `theta` is not finite. Raises ValueError for angles out of
+        range.
+        """
+        return self.sampler.albedo(theta)
+
+    @cached_property
+    def sampler(self) -> HalfVectorSampler:
+        """What `sample`, `pdf` and `albedo` use, fitted when first asked for: see `sampling.half_vector`."""
+        from ..sampling.half_vector import HalfVectorSampler
+
+        return HalfVectorSampler.fitted(self)
+
+
+class Native(Protocol):
+    """A lookup in the core, prepared once: `_core.CellLookup` or `_core.NodeLookup`."""
+
+    def eval(self, wi: Vectors, wo: Vectors) -> Vectors:
+        """f_r (n, 3) of pairs of directions (n, 3)."""
+        ...
 
 
 class OnLattice(Brdf):
     """A BRDF that looks up values of a lattice. The core evaluates it, as `Brdf.eval` does in NumPy."""
 
+    lattice: AnyLattice
     interpolation: Interpolation
-    source_sha256: str
 
     @property
     def reciprocal(self) -> bool:
-        return self.grid is None or self.grid.reciprocal
-
-    def eval(self, wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float64]:
-        light, viewer = vectors("eval", wi, wo)
-        pairs = (np.ascontiguousarray(w).reshape(-1, 3) for w in (light, viewer))
-        return self._found(*pairs).reshape(light.shape)
-
-    def _found(self, wi: NDArray[np.float64], wo: NDArray[np.float64]) -> NDArray[np.float64]:
-        """f_r of pairs of shape (n, 3)."""
-        index, values = self.cells()
-        lattice = self.grid or MERL
-        return _core.lookup(
-            wi,
-            wo,
-            lattice.shape,
-            lattice.reciprocal,
-            self.interpolation == "trilinear",
-            values.reshape(-1),
-            None if index is None else index.reshape(-1),
-        )
+        return self.lattice.reciprocal
 
     @property
-    @abstractmethod
+    def lookup(self) -> str:
+        return self.interpolation
+
+    @property
     def grid(self) -> Lattice | None:
-        """The lattice of cells; None if values belong to nodes."""
+        return self.lattice.grid
+
+    def eval(self, wi: ArrayLike, wo: ArrayLike) -> Vectors:
+        light, viewer = vectors("eval", wi, wo)
+        pairs = (np.ascontiguousarray(w).reshape(-1, 3) for w in (light, viewer))
+        return self._native.eval(*pairs).reshape(light.shape)
 
     @abstractmethod
-    def cells(self) -> tuple[NDArray[Any] | None, NDArray[np.float64]]:
-        """The LUT entry of each cell, and the LUT; or None, and the cells' values."""
+    def native(self) -> Native:
+        """A lookup in the core for the material as it is."""
 
-    def with_interpolation(self, interpolation: Interpolation) -> Self:
-        """The same values, looked up in another way. Raises MaterialError if there is no such way."""
+    @cached_property
+    def _native(self) -> Native:
+        return self.native()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what was prepared of it: a copy may be looked up in another way, or live in another process."""
+        return {name: value for name, value in self.__dict__.items() if name not in ("_native", "sampler")}
+
+    def with_interpolation(self, interpolation: str) -> Self:
         other = copy(self)
-        other._interpolate(interpolation)
+        other.interpolation = self.lattice.checked(self.name, interpolation)
         return other
 
-    def _interpolate(self, interpolation: Interpolation) -> None:
-        self.interpolation = checked(interpolation)
 
-
-def vectors(caller: str, *given: ArrayLike) -> list[NDArray[np.float64]]:
+def vectors(caller: str, *given: ArrayLike) -> list[Vectors]:
     """Arrays of shape (..., 3), broadcast to one shape. Raises ValueError, which names the caller, for other shapes,
     and for what are not real numbers.
     """
@@ -151,7 +248,7 @@ def vectors(caller: str, *given: ArrayLike) -> list[NDArray[np.float64]]:
         raise ValueError(f"{caller}: expected shapes that broadcast, found {found}") from error
 
 
-def _real(caller: str, given: ArrayLike) -> NDArray[np.float64]:
+def _real(caller: str, given: ArrayLike) -> Vectors:
     try:
         array = np.asarray(given)
     except (TypeError, ValueError) as error:
@@ -164,13 +261,13 @@ def _real(caller: str, given: ArrayLike) -> NDArray[np.float64]:
         return array.astype(np.float64)
 
 
-def told(wi: NDArray[np.float64], wo: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def told(wi: Vectors, wo: Vectors) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Of pairs of vectors (..., 3): whether all components are finite; and whether, besides, both have z > 0."""
     known = np.asarray((np.isfinite(wi) & np.isfinite(wo)).all(axis=-1))
     return known, known & (wi[..., 2] > 0) & (wo[..., 2] > 0)
 
 
-def finite(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def finite(values: Vectors) -> Vectors:
     """The same, with 0 for what is no number, and LARGEST for infinity: with vectors that are long, or next to the
     horizon, formulas overflow."""
     return values if np.isfinite(values).all() else np.nan_to_num(values, nan=0.0, posinf=LARGEST, neginf=-LARGEST)

@@ -5,10 +5,10 @@ The default is MERL's: 90 × 90 × 180 cells, dense in θ_h near the highlight (
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +16,14 @@ from numpy.typing import NDArray
 from ..system.errors import MaterialError
 from .arrays import Array, Triple, ops
 from .half_diff import TWO_PI, half_diff
+from .lattice import AnyLattice, Interpolation
 
-Interpolation = Literal["nearest", "trilinear"]
-INTERPOLATIONS: tuple[Interpolation, ...] = ("nearest", "trilinear")
 HALF_PI = TWO_PI / 4
 ON_HORIZON = 1e-12  # a cosine up to that is 0 but for rounding; files depend on which cells count
 
 
 @dataclass(frozen=True)
-class Lattice:
+class Lattice(AnyLattice):
     """Cells in (θ_h, θ_d, φ_d). Cell number = φ_d + phi_d · (θ_d + theta_d · θ_h), of the bin numbers.
 
     theta_h, theta_d, phi_d: number of bins. θ_h bins are equal in √θ_h, the others are equal in the angle.
@@ -36,6 +35,7 @@ class Lattice:
     theta_d: int = 90
     phi_d: int = 180
     reciprocal: bool = True
+    interpolations: ClassVar[tuple[Interpolation, ...]] = ("nearest", "trilinear")
 
     def __post_init__(self) -> None:
         if min(self.shape) < 1:
@@ -49,6 +49,14 @@ class Lattice:
     def size(self) -> int:
         """The number of cells."""
         return self.theta_h * self.theta_d * self.phi_d
+
+    @property
+    def grid(self) -> Lattice:
+        return self
+
+    @property
+    def array_shape(self) -> tuple[int, int, int]:
+        return self.shape
 
     @property
     def phi_d_range(self) -> float:
@@ -102,6 +110,10 @@ class Lattice:
         extended[~self.above_horizon] = values[h, last[h, p], p]
         return extended
 
+    def place(self, wi: Triple, wo: Triple) -> Triple:
+        """(θ_h, θ_d, φ_d) [rad] of pairs of directions."""
+        return half_diff(wi, wo, self.reciprocal)
+
     def cell(self, theta_h: Array, theta_d: Array, phi_d: Array) -> Array:
         """The number of the cell that holds the given angles [rad]."""
         f = ops(theta_h)
@@ -111,13 +123,15 @@ class Lattice:
         k = f.bin(w, self.phi_d)
         return k + self.phi_d * (j + self.theta_d * i)
 
-    def corners(self, theta_h: Array, theta_d: Array, phi_d: Array) -> list[tuple[Array, Array]]:
-        """The 8 cells about the given angles [rad] and their weights, which add up to 1.
+    def corners(
+        self, x: Array, y: Array, z: Array, buffers: Mapping[str, Any] | None = None
+    ) -> list[tuple[Array, Array]]:
+        """The 8 cells about the angles θ_h, θ_d, φ_d [rad], and their weights, which add up to 1.
 
         Weights are linear in the bins' numbers between cell centres; φ_d wraps, θ_h and θ_d clamp.
         """
-        f = ops(theta_h)
-        u, v, w = self._position(theta_h, theta_d, phi_d)
+        f = ops(x)
+        u, v, w = self._position(x, y, z)
         (i0, i1, a), (j0, j1, b) = _between(f, u, self.theta_h), _between(f, v, self.theta_d)
         w = w - 0.5
         below = f.floor(w)
@@ -131,17 +145,17 @@ class Lattice:
             for k, r in ((k0, 1.0 - c), (k1, c))
         ]
 
-    def lookup(self, wi: Triple, wo: Triple, interpolation: Interpolation, fetch: Callable[[Array], Triple]) -> Triple:
-        """What `fetch` gives for the nearest cell's number, or interpolated from the 8 cells around."""
-        angles = half_diff(wi, wo, self.reciprocal)
+    def lookup(
+        self,
+        wi: Triple,
+        wo: Triple,
+        interpolation: Interpolation,
+        buffers: Mapping[str, Any],
+        fetch: Callable[[Array], Triple],
+    ) -> Triple:
         if interpolation == "nearest":
-            return fetch(self.cell(*angles))
-        (index, weight), *others = self.corners(*angles)
-        r, g, b = (weight * value for value in fetch(index))
-        for index, weight in others:
-            more = fetch(index)
-            r, g, b = r + weight * more[0], g + weight * more[1], b + weight * more[2]
-        return r, g, b
+            return fetch(self.cell(*self.place(wi, wo)))
+        return super().lookup(wi, wo, interpolation, buffers, fetch)
 
     def _position(self, theta_h: Array, theta_d: Array, phi_d: Array) -> Triple:
         """Continuous bin numbers: bin i covers [i, i + 1)."""
@@ -154,13 +168,6 @@ class Lattice:
 
 
 MERL = Lattice()
-
-
-def checked(interpolation: Interpolation) -> Interpolation:
-    """The same. Raises MaterialError if there is no such interpolation."""
-    if interpolation not in INTERPOLATIONS:
-        raise MaterialError(f"interpolation: expected {' or '.join(INTERPOLATIONS)}, found {interpolation}")
-    return interpolation
 
 
 def _between(f: Any, position: Array, bins: int) -> tuple[Array, Array, Array]:

@@ -7,19 +7,19 @@ steps of √(θ_h / 90°), 1/360 each up to 1/4 and 1/120 each from there, θ_d 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..system.errors import MaterialError
-from .arrays import Array, Triple, gather3, ops
-from .brdf import Brdf, Buffers
+from .arrays import Array, Triple, ops
 from .half_diff import TWO_PI, half_diff
+from .lattice import AnyLattice, Interpolation
 
 FINE = 180  # steps of each axis
 KNEE, BELOW, ABOVE = 90, 360, 120  # steps of √(θ_h / 90°) are 1/BELOW up to number KNEE, 1/ABOVE from there
@@ -28,17 +28,22 @@ HALF_PI = TWO_PI / 4
 
 
 @dataclass(frozen=True)
-class NodeLattice:
-    """theta_h: the rows' numbers on the fine grid, from 0 to FINE. band: of each row. theta_d: for each band, from 0 to
-    FINE. phi_d: for each band, from 0 to less than FINE, of which the first follows upon the last.
+class NodeLattice(AnyLattice):
+    """The places of the nodes, as numbers of steps on the fine grid.
 
-    Raises MaterialError for nodes that are not such.
+    theta_h: of each row, increasing, the first 0 and the last FINE. band: the number of the band that each row belongs
+        to. theta_d: of the nodes of each band, increasing, the first 0 and the last FINE. phi_d: of the nodes of each
+        band, increasing, the first 0 and the last below FINE; since φ_d turns, the first one follows the last.
+
+    A lookup is reciprocal: φ_d covers [0, π). Raises MaterialError for axes that are not like that.
     """
 
     theta_h: tuple[int, ...]
     band: tuple[int, ...]
     theta_d: tuple[tuple[int, ...], ...]
     phi_d: tuple[tuple[int, ...], ...]
+    interpolations: ClassVar[tuple[Interpolation, ...]] = ("trilinear",)
+    reciprocal: ClassVar[bool] = True  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def __post_init__(self) -> None:
         bands = sorted(set(self.band))
@@ -58,6 +63,14 @@ class NodeLattice:
     def size(self) -> int:
         """The number of nodes."""
         return int(self.base[-1])
+
+    @property
+    def grid(self) -> None:
+        return None
+
+    @property
+    def array_shape(self) -> tuple[int]:
+        return (self.size,)
 
     def buffers(self) -> dict[str, NDArray[Any]]:
         """What `corners` reads: for each step of the fine grid the node below, and the nodes' places."""
@@ -82,16 +95,11 @@ class NodeLattice:
         """theta_h, band, theta_d, phi_d, as the core takes them."""
         return list(self.theta_h), list(self.band), [*map(list, self.theta_d)], [*map(list, self.phi_d)]
 
-    def lookup(self, wi: Triple, wo: Triple, fetch: Callable[[Array], Triple], buffers: Buffers) -> Triple:
-        """What `fetch` gives for the nodes about a pair of directions, blended."""
-        (node, weight), *others = self.corners(*place(wi, wo), buffers)
-        x, y, z = (weight * value for value in fetch(node))
-        for node, weight in others:
-            more = fetch(node)
-            x, y, z = x + weight * more[0], y + weight * more[1], z + weight * more[2]
-        return x, y, z
+    def place(self, wi: Triple, wo: Triple) -> Triple:
+        """Where pairs of directions lie on the fine grid."""
+        return place(wi, wo)
 
-    def corners(self, x: Array, y: Array, z: Array, buffers: Buffers) -> list[tuple[Array, Array]]:
+    def corners(self, x: Array, y: Array, z: Array, buffers: Mapping[str, Any]) -> list[tuple[Array, Array]]:
         """The 8 nodes about a place on the fine grid (θ_h, θ_d, φ_d), and their weights, which add up to 1."""
         f = ops(x)
         step = [f.bin(c, FINE) for c in (x, y, z)]
@@ -145,25 +153,6 @@ def from_cube_root(y: Triple, wi: Triple, wo: Triple, scale: Array) -> Triple:
         return above * above * above * factor
 
     return channel(y[0]), channel(y[1]), channel(y[2])
-
-
-class FittedTable(Brdf):
-    """A material as values on a lattice of its own, in the cube-root domain, not quantised.
-
-    values: y of each node, (nodes.size, 3). Reciprocal by construction. Made by `compression.compact.lattice_fit`.
-    """
-
-    def __init__(self, nodes: NodeLattice, values: NDArray[np.float64], scale: float, *, name: str) -> None:
-        if values.shape != (nodes.size, 3) or not np.isfinite(values).all():
-            raise MaterialError(f"{name}: expected finite values of shape {(nodes.size, 3)}, found {values.shape}")
-        self.nodes, self.values, self.scale, self.name = nodes, values, scale, name
-
-    def buffers(self) -> dict[str, NDArray[Any]]:
-        return self.nodes.buffers() | {"values": self.values.reshape(-1), "scale": np.array(self.scale)}
-
-    def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
-        y = self.nodes.lookup(wi, wo, lambda node: gather3(buffers["values"], node), buffers)
-        return from_cube_root(y, wi, wo, buffers["scale"])
 
 
 def _increases(axis: tuple[int, ...]) -> bool:

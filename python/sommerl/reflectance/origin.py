@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Any, cast
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
 
 from ..system.errors import FormatError
 from ..system.visible import visible
-from .brdf import Brdf
+
+if TYPE_CHECKING:
+    from .brdf import Brdf
 
 Link = Mapping[str, str]  #: "kind", "name" and "sha256" of a source
 
@@ -18,26 +21,45 @@ LONGEST_NAME = 255
 MOST_LINKS = 8  # of a longer chain, those before the first source are left out
 
 
-def source_of(brdf: Brdf) -> tuple[str, tuple[Link, ...]]:
-    """What is to be kept of `brdf` in a material that is made from it: a SHA-256, and a chain.
+@dataclass(frozen=True)
+class Source:
+    """Where a material's data comes from.
+
+    sha256: of the file that it was read or made from, in hexadecimal digits; of the values where there is no file; ""
+        if nothing is known.
+    made_from: where that file was a compressed material itself, the chain back to the first source: each link's "kind"
+        and "name", and the "sha256" of all but the first link, which is `sha256`.
+    """
+
+    sha256: str = ""
+    made_from: tuple[Link, ...] = ()
+
+    def chain(self) -> tuple[Link, ...]:
+        """The links of `made_from`, each with its SHA-256."""
+        if not self.made_from:
+            return ()
+        return {**self.made_from[0], "sha256": self.sha256}, *self.made_from[1:]
+
+
+def source_of(brdf: Brdf) -> Source:
+    """What is to be kept of `brdf` in a material that is made from it.
 
     Of a compressed material, the SHA-256 of its file ("" if it was never read from one), and the chain: its own kind
-    and name, what it was made from, and so on. Of anything else, what is known of its source, and mostly no chain.
+    and name, what it was made from, and so on. Of anything else, its own source.
     """
-    if not brdf.compressed_as:
-        return getattr(brdf, "source_sha256", None) or "", brdf.made_from
-    before = full_chain(brdf) or (
-        {"kind": FIRST, "name": brdf.name[:LONGEST_NAME], "sha256": getattr(brdf, "source_sha256", "")},
-    )
-    chain = ({"kind": brdf.compressed_as, "name": brdf.name[:LONGEST_NAME]}, *before)
-    return brdf.file_sha256, chain if len(chain) <= MOST_LINKS else (*chain[: MOST_LINKS - 1], chain[-1])
+    if not brdf.compressed:
+        return brdf.source
+    before = brdf.source.chain() or ({"kind": FIRST, "name": brdf.name[:LONGEST_NAME], "sha256": brdf.source.sha256},)
+    chain = ({"kind": brdf.kind, "name": brdf.name[:LONGEST_NAME]}, *before)
+    return Source(brdf.file_sha256, chain if len(chain) <= MOST_LINKS else (*chain[: MOST_LINKS - 1], chain[-1]))
 
 
-def full_chain(brdf: Brdf) -> tuple[Link, ...]:
-    """The chain, with the SHA-256 of its first link, which a material keeps as `source_sha256` alone."""
-    if not brdf.made_from:
-        return ()
-    return {**brdf.made_from[0], "sha256": getattr(brdf, "source_sha256", "")}, *brdf.made_from[1:]
+def measured_against(brdf: Brdf) -> dict[str, str] | None:
+    """What the figures in a compressed material are against: what it was directly made from. None of any other."""
+    if not brdf.compressed:
+        return None
+    source = {"kind": FIRST, "name": brdf.name, "sha256": brdf.source.sha256}
+    return dict(next(iter(brdf.source.chain()), source))
 
 
 def check_chain(value: Any) -> tuple[Link, ...]:

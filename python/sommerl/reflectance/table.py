@@ -10,13 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import _core
 from ..system.errors import MaterialError
 from .arrays import Triple, gather3
-from .brdf import Brdf, Buffers, OnLattice
-from .cells import MERL, Interpolation, Lattice, checked
+from .brdf import LARGEST, Brdf, Buffers, Native, OnLattice
+from .cells import MERL, Lattice
 from .distance import energy_share
 from .half_diff import directions
-from .origin import source_of
+from .info import Counts
+from .lattice import Interpolation
+from .origin import Source, source_of
 
 
 class BrdfTable(OnLattice):
@@ -32,6 +35,8 @@ class BrdfTable(OnLattice):
     Raises MaterialError if the shape is not the lattice's, or nothing above the horizon is positive.
     """
 
+    kind = "table"
+    lattice: Lattice
     source_facts: Mapping[str, Any] = MappingProxyType({})  #: `facts` of what the table was sampled from
 
     def __init__(
@@ -48,20 +53,20 @@ class BrdfTable(OnLattice):
             raise MaterialError(f"expected values of shape {(*lattice.shape, 3)}, found {f_r.shape}")
         self.values: NDArray[np.float64] = lattice.extended(f_r)
         # Not true, either, of NaN. Renderers calculate in single precision.
-        unusable = ~((self.values >= 0) & (self.values <= np.finfo(np.float32).max))
+        unusable = ~((self.values >= 0) & (self.values <= LARGEST))
         share = energy_share(np.where(unusable, self.values, 0.0), self.values, lattice) if unusable.any() else 0.0
         self.values[unusable] = 0.0
         if not (self.values > 0).any():
             raise MaterialError("expected a positive, finite reflectance above the horizon, found none")
         self.name = name
-        self.lattice = lattice
-        self.interpolation: Interpolation = checked(interpolation)
+        self.lattice = lattice  # pyright: ignore[reportIncompatibleVariableOverride] # narrower, and never assigned
+        self.interpolation: Interpolation = lattice.checked(name, interpolation)
         self.cells_clamped = int(unusable[lattice.above_horizon].any(axis=-1).sum())
         self.energy_clamped = share
-        self.source_sha256 = source_sha256 or hashlib.sha256(self.values.astype("<f8").tobytes()).hexdigest()
+        self.source = Source(source_sha256 or hashlib.sha256(self.values.astype("<f8").tobytes()).hexdigest())
 
     @classmethod
-    def sample(cls, brdf: Brdf, lattice: Lattice = MERL) -> BrdfTable:
+    def sampled(cls, brdf: Brdf, lattice: Lattice = MERL) -> BrdfTable:
         """The table of a BRDF's values at the cell centres above the horizon.
 
         On a reciprocal lattice, the mean of both orders of the directions. What the BRDF itself sets to 0 is counted,
@@ -80,10 +85,10 @@ class BrdfTable(OnLattice):
         """The BRDF itself if it is a table; else the table of its cells, or at MERL's cell centres if it has none."""
         if isinstance(brdf, BrdfTable):
             return brdf
-        table = cls.sample(brdf, (brdf.grid if isinstance(brdf, OnLattice) else None) or MERL)
+        table = cls.sampled(brdf, brdf.table_lattice)
         table.source_facts = brdf.facts
-        sha256, table.made_from = source_of(brdf)
-        table.source_sha256 = sha256 or table.source_sha256
+        source = source_of(brdf)
+        table.source = Source(source.sha256 or table.source.sha256, source.made_from)
         return table
 
     @property
@@ -91,14 +96,22 @@ class BrdfTable(OnLattice):
         return dict(self.source_facts)
 
     @property
+    def counts(self) -> Counts:
+        return Counts(self.cells_clamped, self.energy_clamped)
+
+    @property
     def grid(self) -> Lattice:
         return self.lattice
 
-    def cells(self) -> tuple[None, NDArray[np.float64]]:
-        return None, self.values
+    def details(self) -> dict[str, Any]:
+        return {"lattice": list(self.lattice.shape), "interpolation": self.interpolation, "domain": "linear"}
 
     def buffers(self) -> dict[str, NDArray[Any]]:
         return {"values": self.values.reshape(-1)}
 
     def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
-        return self.lattice.lookup(wi, wo, self.interpolation, lambda cell: gather3(buffers["values"], cell))
+        return self.lattice.lookup(wi, wo, self.interpolation, buffers, lambda cell: gather3(buffers["values"], cell))
+
+    def native(self) -> Native:
+        trilinear = self.interpolation == "trilinear"
+        return _core.CellLookup(self.lattice.shape, self.lattice.reciprocal, trilinear, self.values.reshape(-1))

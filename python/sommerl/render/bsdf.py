@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..formats import scene
-from ..formats.load import interpolated, load
+from ..formats.load import load
 from ..reflectance.arrays import Packed16, Triple
 from ..reflectance.brdf import Brdf
 from ..sampling import named
@@ -63,7 +63,7 @@ def _from_properties(props: Any) -> Any:
     found = next((f"{place}{rest}" for file, rest in places if (place := Path(str(resolve(file)))).is_file()), name)
     brdf = load(found)
     if "interpolation" in props:
-        brdf = interpolated(brdf, props["interpolation"])
+        brdf = brdf.with_interpolation(props["interpolation"])
     sampler = str(props["sampler"]) if "sampler" in props else named.OURS.name
     return _plugin()(props, brdf, named.fitted(sampler, brdf))
 

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..reflectance.arrays import Array, Triple, gather3, ops
 from ..reflectance.brdf import Brdf, Buffers
@@ -41,6 +41,7 @@ TINY = 1e-9  # added to lengths along x, so that the azimuth of the normal itsel
 LOWEST = 1e-4  # cos θ_o of the table's lowest elevation, which would be 0 if that did not make solid angles 0
 DIFFUSE = 0.01  # share of directions that follow the cosine
 FINER = 3  # points along each side of a cell at which the BRDF is evaluated
+EXACT = 8  # the same for a single albedo
 VIEWERS = 31  # elevations for which albedos are tabulated, at equal steps of θ_o
 NEIGHBOUR = 0.07  # a cell gets at least this share of the brightest light in and next to it, which bounds weights
 
@@ -104,6 +105,22 @@ class HalfVectorSampler(Sampler):
         # As in `_mirrored`, without the lengths, which cancel.
         pdf = share * (s * hz) * ((x * x + y * y) * (rim * rim) * (1.0 / 32))
         return f.where(above, pdf, 0.0)
+
+    def albedo(self, theta: ArrayLike) -> NDArray[np.float64]:
+        """The albedo as `Brdf.albedo` defines it, from EXACT² points in each cell on both sides of the viewer's plane.
+
+        theta: the viewer's polar angles [rad], (...). Returns (..., 3). Raises ValueError for angles outside [0, π/2].
+        """
+        angles = np.asarray(theta, np.float64)
+        known = np.isfinite(angles)
+        if ((angles < 0) | (angles > PI / 2)).any():
+            raise ValueError("albedo: polar angles have to be from 0 to π/2, and some are not")
+        found = np.full((angles.size, 3), np.nan)
+        for number in np.flatnonzero(known):
+            cos_o = np.cos(angles.reshape(-1)[number : number + 1])
+            sides = [_light(self.brdf, cos_o, EXACT, side)[0].mean(axis=(0, 1, 2, 3)) for side in (1.0, -1.0)]
+            found[number] = (sides[0] + sides[1]) / 2
+        return found.reshape(*angles.shape, 3)
 
 
 def albedos(brdf: Brdf) -> NDArray[np.float64]:
@@ -186,16 +203,19 @@ def _mirrored(s: Array, c: Array, side: Array, wo: Triple) -> tuple[Triple, Arra
     return wi, 64.0 * (s6 * s) * extent * dot / (cos * round_)
 
 
-def _light(brdf: Brdf, cos_o: NDArray[np.float64], finer: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _light(
+    brdf: Brdf, cos_o: NDArray[np.float64], finer: int, side: float = 1.0
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The light f_r cos θ_i dω_i at finer² points in each cell of the unit square, for viewers at cos θ_o; and
     cos θ_i dω_i alone.
 
-    Their shapes are (elevations, ROWS, COLUMNS, points, channels), and the same without channels.
+    Their shapes are (elevations, ROWS, COLUMNS, points, channels), and the same without channels. side: of the viewer's
+    plane, 1 or -1.
     """
     s, c = (((np.arange(finer * n) + 0.5) / (finer * n)) for n in (ROWS, COLUMNS))
     z, s, c = np.broadcast_arrays(cos_o[:, None, None], s[:, None], 2 * c)
     wo = np.sqrt(1 - z * z), np.zeros_like(z), z
-    wi, solid_angle = _mirrored(s, c, np.ones_like(c), wo)
+    wi, solid_angle = _mirrored(s, c, np.full_like(c, side), wo)
     cosine = np.maximum(wi[2], 0.0) * solid_angle
     light = brdf.eval(np.stack(wi, axis=-1), np.stack(wo, axis=-1)) * cosine[..., None]
 

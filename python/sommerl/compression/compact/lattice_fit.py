@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from ...reflectance.arrays import Triple
 from ...reflectance.brdf import Brdf
 from ...reflectance.half_diff import directions
-from ...reflectance.nodes import ABOVE, BELOW, FINE, KNEE, SMALLEST_COSINE, FittedTable, NodeLattice, angles_at, damped
+from ...reflectance.nodes import ABOVE, BELOW, FINE, KNEE, SMALLEST_COSINE, NodeLattice, angles_at, damped
 from ...system.errors import MaterialError
 from ...system.optional import optional
+from .fitted_table import FittedTable
 from .quantise import Problem
 
 Array = NDArray[np.float64]

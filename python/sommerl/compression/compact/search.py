@@ -19,6 +19,7 @@ from ...reflectance.brdf import Brdf
 from ...reflectance.origin import source_of
 from ...system.errors import MaterialError, OptionError
 from ..material import SomManBrdf
+from ..palette import GainsAndShapes
 from ..smrl import file
 from ..smrl.codes import gain_values, shape_values
 from .lattice_fit import LARGEST, SMALLEST, Fitter
@@ -122,7 +123,7 @@ class Compressor:
         self.tried: list[tuple[int, int, float]] = []
         self._brdf, self._seed, self._quality = brdf, seed, quality
         self._step = step or (lambda: None)
-        self._sha256, self._made_from = source_of(brdf)
+        self._source = source_of(brdf)
         self._fitter = Fitter(brdf, seed=seed)
         self._step()
 
@@ -175,7 +176,7 @@ class Compressor:
         nodes = int(np.clip(spread * usual_nodes(size), SMALLEST, LARGEST))
         problem = self._fitter.problem(nodes)
         gains, shapes = (min(MOST_ENTRIES, round(share * math.sqrt(nodes))) for share in (GAINS, SHAPES))
-        head = file.head_bytes(self._brdf.name, self._sha256, self._made_from)
+        head = file.head_bytes(self._brdf.name, self._source)
         if size < 2 * head:  # less than half of the file would be left for the material
             raise MaterialError(
                 f"{self._brdf.name}: its name and source take {head} bytes of the {size} asked for; ask for at least "
@@ -183,15 +184,12 @@ class Compressor:
             )
         found, stream = quantise(problem, gains, shapes, size - head, seed=self._seed)
         material = SomManBrdf(
-            shape_values(found.shapes),
-            found.shape_index,
+            GainsAndShapes(gain_values(found.gains), shape_values(found.shapes), self._fitter.scale),
+            np.stack([found.gain_index, found.shape_index]),
             problem.lattice,
-            gains=gain_values(found.gains),
-            gain_index=found.gain_index,
-            scale=self._fitter.scale,
             name=self._brdf.name,
-            source_sha256=self._sha256,
-            made_from=self._made_from,
+            source_sha256=self._source.sha256,
+            made_from=self._source.made_from,
         )
         error = problem.error + problem.excess(found.values())
         # Rounded, so that rounding errors, which differ between machines, do not decide between candidates.

@@ -75,8 +75,8 @@ def train(
         table.lattice,
         name=table.name,
         options=asdict(options),
-        source_sha256=table.source_sha256,
-        made_from=table.made_from,
+        source_sha256=table.source.sha256,
+        made_from=table.source.made_from,
     )
     dropped = options.clusters - len(cells)
     return material, TrainReport(

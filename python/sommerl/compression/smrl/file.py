@@ -17,7 +17,6 @@ All numbers are little-endian.
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,14 +24,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import _core
-from ...reflectance.cells import INTERPOLATIONS, Lattice
+from ...reflectance.brdf import LARGEST
+from ...reflectance.cells import Lattice
+from ...reflectance.lattice import INTERPOLATIONS
 from ...reflectance.nodes import NodeLattice
-from ...reflectance.origin import Link
+from ...reflectance.origin import Source
 from ...system import door, sealed_file
 from ...system.errors import FormatError, MaterialError, OptionError, SommerlError
 from ...system.files import atomic_write
 from ...system.sealed_file import BYTE, Reader
-from ..material import LARGEST, SomManBrdf
+from ..material import SomManBrdf
+from ..palette import GainsAndShapes
 from . import notes
 from .codes import coordinates, gain_codes, gain_values, shape_codes, shape_values
 
@@ -87,20 +89,19 @@ def parse(path: Path, data: bytes) -> SomManBrdf:
 def encode(material: SomManBrdf) -> bytes:
     """The bytes of a material's file; always the same for the same material. Raises FormatError as `save` does."""
     noted = _noted(material)
-    nodes = isinstance(material.lattice, NodeLattice)
-    body = _head(NODES if nodes else CELLS, material.name, material.source_sha256, noted)
-    body += _nodes(material) if nodes else _cells(material)
+    kind, contents = (NODES, _nodes(material)) if material.grid is None else (CELLS, _cells(material, material.grid))
+    body = _head(kind, material.name, material.source.sha256, noted) + contents
     return sealed_file.sealed(MAGIC, VERSION, body)
 
 
 def _noted(material: SomManBrdf) -> bytes:
     """The bytes of a material's notes."""
-    return notes.written(made_from=list(material.made_from), metrics=material.metrics, options=material.options)
+    return notes.written(made_from=list(material.source.made_from), metrics=material.metrics, options=material.options)
 
 
-def head_bytes(name: str, source_sha256: str, made_from: Sequence[Link]) -> int:
+def head_bytes(name: str, source: Source) -> int:
     """The length of a compact material's file before its stream [bytes]."""
-    head = _head(NODES, name, source_sha256, notes.written(made_from=list(made_from)))
+    head = _head(NODES, name, source.sha256, notes.written(made_from=list(source.made_from)))
     return sealed_file.PREFIX.size + len(head) + NODES_HEAD.size
 
 
@@ -130,8 +131,7 @@ def _material(reader: Reader) -> SomManBrdf:
     return _from_nodes(reader, known) if kind == NODES else _from_cells(reader, known)
 
 
-def _cells(material: SomManBrdf) -> bytes:
-    lattice = material.grid or Lattice()
+def _cells(material: SomManBrdf, lattice: Lattice) -> bytes:
     if lattice.size > MOST_CELLS or max(lattice.shape) > MOST_BINS:
         raise FormatError(f"{material.name}: expected at most {MOST_CELLS} cells, found {lattice.shape}")
     index = material.index[lattice.above_horizon]
@@ -166,13 +166,15 @@ def _from_cells(reader: Reader, known: dict[str, Any]) -> SomManBrdf:
 
 
 def _nodes(material: SomManBrdf) -> bytes:
-    gains, shapes = gain_codes(material.gains), shape_codes(coordinates(material.lut))
-    if not (np.array_equal(gain_values(gains), material.gains) and np.array_equal(shape_values(shapes), material.lut)):
+    entries, lattice = material.palette, material.lattice
+    assert isinstance(entries, GainsAndShapes)
+    assert isinstance(lattice, NodeLattice)
+    gains, shapes = gain_codes(entries.gains), shape_codes(coordinates(entries.lut))
+    if not (np.array_equal(gain_values(gains), entries.gains) and np.array_equal(shape_values(shapes), entries.lut)):
         raise FormatError(f"{material.name}: expected a palette whose values have codes, found others")
-    assert isinstance(material.lattice, NodeLattice)
     try:
-        palette = _core.NodePalette(*material.lattice.axes(), gains.tolist(), shapes.tolist())
-        return NODES_HEAD.pack(material.scale) + palette.encode(material.gain_index, material.index)
+        palette = _core.NodePalette(*lattice.axes(), gains.tolist(), shapes.tolist())
+        return NODES_HEAD.pack(entries.scale) + palette.encode(*material.index)
     except (ValueError, OverflowError) as error:
         raise FormatError(f"{material.name}: {error}") from error
 
@@ -187,5 +189,5 @@ def _from_nodes(reader: Reader, known: dict[str, Any]) -> SomManBrdf:
         raise FormatError(str(error)) from error
     axes = (tuple(map(tuple, axis)) for axis in (palette.theta_d, palette.phi_d))
     lattice = NodeLattice(tuple(palette.theta_h), tuple(palette.band), *axes)
-    lut, gains = shape_values(np.array(palette.shapes)), gain_values(np.array(palette.gains))
-    return SomManBrdf(lut, shape, lattice, gains=gains, gain_index=gain, scale=scale, **known)
+    shapes, gains = shape_values(np.array(palette.shapes)), gain_values(np.array(palette.gains))
+    return SomManBrdf(GainsAndShapes(gains, shapes, scale), np.stack([gain, shape]), lattice, **known)

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...reflectance.brdf import OnLattice
+from ...compression.material import SomManBrdf
+from ...reflectance.brdf import Brdf
 from ...reflectance.cells import Lattice
 from ...reflectance.nodes import ABOVE, BELOW, FINE, HALF_PI, KNEE, SMALLEST_COSINE
 from ...sampling import half_vector
@@ -54,7 +55,7 @@ class _Parts:
     values: dict[str, str]
 
 
-def write(material: OnLattice, path: str | Path) -> None:
+def write(material: Brdf, path: str | Path) -> None:
     """Writes a compressed material as source code in the language that the path's extension names, of LANGUAGES.
 
     Raises FormatError for a table that is not compressed.
@@ -77,15 +78,15 @@ def comment(text: str) -> str:
     return re.sub(r"\s+", " ", re.sub(r"\\|\?(?=\?)|\*(?=/)", " ", visible(text, LONGEST_TITLE)))
 
 
-def source(material: OnLattice, language: Language, name: str) -> str:
+def source(material: Brdf, language: Language, name: str) -> str:
     """The source code. name: of the namespace in C++, and before the names of functions in the others."""
-    index, lut = material.cells()
-    if index is None:
-        raise FormatError(f"{material.name}: expected a compressed material, with a palette, found a table")
-    if material.grid:
-        parts = _cells(material.grid, material.interpolation, index, lut)
+    if not isinstance(material, SomManBrdf):
+        raise FormatError(f"{material.name}: expected a compressed material, with a palette, found a {material.kind}")
+    buffers, lut = material.buffers(), material.lut
+    if material.grid is None:
+        parts = _nodes(buffers, lut)
     else:
-        parts = _nodes(material.buffers(), lut)
+        parts = _cells(material.grid, material.interpolation, buffers["index"], lut)
     table = half_vector.HalfVectorSampler.fitted(material).table
     arrays = [*parts.arrays, _words("SOMMERL_SAMPLER", "sampler", table.reshape(-1))]
     macros = [array.macro for array in arrays]
@@ -98,7 +99,7 @@ def source(material: OnLattice, language: Language, name: str) -> str:
     values = parts.values | {constant: repr(getattr(half_vector, constant)) for constant in OF_SAMPLER}
     values |= {
         "TITLE": comment(material.name),
-        "SHA": comment(material.source_sha256) or "unknown",
+        "SHA": comment(material.source.sha256) or "unknown",
         "NAME": name,
         "CALL": f"{name}::" if language is CPP else f"{name}_",
         "MACROS": " and ".join((", ".join(f"{macro}(i)" for macro in macros[:-1]), f"{macros[-1]}(i)")),
