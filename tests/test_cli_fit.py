@@ -75,7 +75,7 @@ def test_a_table_and_a_compressed_one(capsys, tmp_path):
         (["red-fabric", "-o", "x.txt"], 2, "error: x.txt: expected a name that ends in .json"),
         (["red-fabric", "--picture", "x.jpg"], 2, "error: x.jpg: expected a name that ends in .png"),
         (["red-fabrik"], 1, "error: red-fabrik: expected a file or a built-in material"),
-        (["nowhere.binary"], 1, "error: nowhere.binary: expected a file, found none"),
+        (["nowhere.binary"], 1, "error: nowhere.binary: there is no such file"),
     ],
 )
 def test_bad_options(capsys, arguments, status, message):

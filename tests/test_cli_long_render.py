@@ -104,7 +104,7 @@ def test_a_file_in_the_place_of_a_checkpoint_that_is_none(capsys, tmp_path):
     part.mkdir()
     status, _, err = run(capsys, "render", "nickel", "-o", tmp_path / "x.png", *SMALL)
     assert status == 2
-    assert err == f"error: {part}: expected a checkpoint or nothing, found something else, which is kept\n"
+    assert err == f"error: {part}: the render's checkpoint needs this name, which something else has: rename that\n"
     assert not (tmp_path / "x.png").exists()
     part.rmdir()
     for number, content in (("", b""), (2, b"something else"), (3, b"SMRP\1\0 and nothing more")):
@@ -112,7 +112,7 @@ def test_a_file_in_the_place_of_a_checkpoint_that_is_none(capsys, tmp_path):
         status, _, err = run(capsys, "render", "nickel", "-o", tmp_path / "x.png", *SMALL)
         aside = tmp_path / f"{part.name}.damaged{number}"
         assert status == 0
-        assert err.startswith(f"warning: {part}: expected ")
+        assert err.startswith(f"warning: {part}: it is damaged or not a checkpoint (")
         assert err.endswith(f"; it is kept as {aside.name}, and the render starts anew\n")
         assert err.count("\n") == 1
         assert aside.read_bytes() == content
@@ -147,7 +147,7 @@ def test_whatever_decides_the_pixels_makes_it_another_render(capsys, tmp_path, m
     given = [each for each in usual if each != "chrome"] if what == "material 1" else usual
     status, _, err = run(capsys, "render", *given, *change)
     assert status == 0
-    assert f"expected the same render, found another {what}; this one starts anew" in err
+    assert f"it is of a render with another {what}; this render starts anew" in err
 
 
 def test_a_checkpoint_that_cannot_be_written_stops_nothing(capsys, tmp_path, monkeypatch):

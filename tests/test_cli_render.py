@@ -139,8 +139,8 @@ def test_a_mesh_without_normals_renders_and_says_so(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "status", "message"),
     [
-        (["--scene", "statue", "--mesh", "{}/none.obj"], 1, "none.obj: expected a mesh, found none"),
-        (["--scene", "statue", "--mesh", "{}/text.obj"], 1, "text.obj: expected triangles, found none"),
+        (["--scene", "statue", "--mesh", "{}/none.obj"], 1, "none.obj: there is no such file"),
+        (["--scene", "statue", "--mesh", "{}/text.obj"], 1, "text.obj: the mesh has no triangles"),
         (["--scene", "sphere", "--mesh", "{}/mesh.obj"], 2, "sphere: expected no --mesh"),
         (["--scene", "still-life", "--envmap", "{}/light.exr"], 2, "still-life: expected no --envmap"),
         (["--envmap", "{}/light.png"], 1, "light.png: expected radiance in numbers that go beyond white"),

@@ -277,7 +277,7 @@ def test_whatever_decides_the_pixels_makes_it_another_render(capsys, tmp_path, m
         change(folder)
     status, _, err = run(capsys, "render", *usual, *options)
     assert status == 0
-    assert f"expected the same render, found another {what}; this one starts anew" in err
+    assert f"it is of a render with another {what}; this render starts anew" in err
 
 
 def test_mitsuba_warns_on_standard_error_once(capsys, tmp_path, short_passes):
@@ -295,7 +295,7 @@ def test_mitsuba_warns_on_standard_error_once(capsys, tmp_path, short_passes):
 @pytest.mark.parametrize(
     ("change", "arguments", "status", "message"),
     [
-        (None, ["{}/none.xml"], 1, "none.xml: expected a scene of Mitsuba's, found no file"),
+        (None, ["{}/none.xml"], 1, "none.xml: there is no such file"),
         (None, ["nickel", "{}/scene.xml"], 2, "scene.xml: expected one scene file and no materials, found 2 inputs"),
         (None, ["{}/scene.xml", "--scene", "sphere"], 2, "--scene: expected no such option beside a scene file"),
         (None, ["{}/scene.xml", "--size", "256"], 2, "--size: expected no such option beside a scene file"),
@@ -317,26 +317,26 @@ def test_mitsuba_warns_on_standard_error_once(capsys, tmp_path, short_passes):
         (None, ["{}/scene.xml", "-D", "width=x"], 1, 'could not parse integer value "x"'),
         (None, ["{}/scene.xml", "-D", "width=1677722"], 1, "film of at most 16777216 pixels, found 1677722 × 10"),
         (None, ["{}/scene.xml", "-D", "material=nickle"], 1, "did you mean nickel"),
-        (None, ["{}/scene.xml", "-D", "material=none.smrl"], 1, "none.smrl: expected a file, found none"),
+        (None, ["{}/scene.xml", "-D", "material=none.smrl"], 1, "none.smrl: there is no such file"),
         (None, ["{}/scene.xml", "-D", "material={}/bad.smrl"], 1, "bad.smrl: expected at least"),
         (
             ("</scene>", ""),
             ["{}/scene.xml"],
             1,
-            "expected a scene that Mitsuba can load, found another (Parsing of XML",
+            "Mitsuba cannot load the scene (Parsing of XML",
         ),
         ((r"\$material", "$other"), ["{}/scene.xml"], 1, "undefined parameter: $other"),
         (('value="8"', 'value="0"'), ["{}/scene.xml"], 2, "scene.xml: sample_count: expected 1 to"),
         (("perspective", "nosuch"), ["{}/scene.xml"], 1, 'Plugin "nosuch" not found'),
         (("<bsdf", '<float name="x" value="1"/><bsdf'), ["{}/scene.xml"], 1, "Found 1 unreferenced property"),
         (("<rfilter", '<include filename="no.xml"/><rfilter'), ["{}/scene.xml"], 1, "scene.xml"),
-        (('<integrator type="path"/>', ""), ["{}/scene.xml"], 1, "expected an integrator, found none"),
-        (("<sensor.*</sensor>", ""), ["{}/scene.xml"], 1, "scene.xml: expected a sensor, found none"),
-        ((" type=", " typ="), ["{}/scene.xml"], 1, "scene.xml: expected a scene that Mitsuba can load"),
-        (None, ["{}/snippet.xml"], 1, "snippet.xml: expected shapes to render (a snippet is for inclusion"),
-        (None, ["{}/bsdf.xml"], 1, "bsdf.xml: expected a scene, found something else"),
-        (None, ["{}/zeros.xml"], 1, "zeros.xml: expected a scene that Mitsuba can load"),
-        (None, ["{}/folder.xml"], 1, "folder.xml: expected a scene of Mitsuba's, found no file"),
+        (('<integrator type="path"/>', ""), ["{}/scene.xml"], 1, "the scene has no integrator"),
+        (("<sensor.*</sensor>", ""), ["{}/scene.xml"], 1, "scene.xml: the scene has no sensor"),
+        ((" type=", " typ="), ["{}/scene.xml"], 1, "scene.xml: Mitsuba cannot load the scene"),
+        (None, ["{}/snippet.xml"], 1, "snippet.xml: the scene has no shapes (a snippet has to be included"),
+        (None, ["{}/bsdf.xml"], 1, "bsdf.xml: the file describes no scene"),
+        (None, ["{}/zeros.xml"], 1, "zeros.xml: Mitsuba cannot load the scene"),
+        (None, ["{}/folder.xml"], 1, "folder.xml: it is not a file"),
         (None, ["{}/scene.xml", "-o", "{}/x.jpg"], 2, "x.jpg: expected a name that ends in .png or .exr"),
     ],
 )

@@ -37,7 +37,7 @@ def test_samples_to_a_table_and_a_picture(capsys, samples, tmp_path):
 def test_a_picture_that_cannot_be_written_is_told_first(capsys, samples, tmp_path):
     (tmp_path / "out.coverage.png").mkdir()
     assert main(["convert", str(samples), str(tmp_path / "out.binary")]) == 1
-    assert "out.coverage.png: expected a file to write, found a directory" in capsys.readouterr().err
+    assert "out.coverage.png: cannot be written: it is a directory, not a file" in capsys.readouterr().err
     assert not (tmp_path / "out.binary").exists()
 
 

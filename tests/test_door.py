@@ -80,8 +80,8 @@ def test_a_file_of_the_system():
 def check_is_refused(name, path, found):
     message = complaint(READERS[name], path)
     assert message is not None
-    assert message.startswith(f"{path}: expected ")
-    assert message.endswith(f"found {found}")
+    assert message.startswith(f"{path}: ")
+    assert message.endswith(found)
 
 
 @pytest.mark.parametrize("name", READERS)
@@ -92,12 +92,12 @@ def test_what_is_no_regular_file_is_refused_at_once(tmp_path, name):
     (tmp_path / f"folder{suffix}").mkdir()
     with socket.socket(socket.AF_UNIX) as server:
         server.bind(str(tmp_path / f"s{suffix}"))
-    check_is_refused(name, tmp_path / f"pipe{suffix}", "a pipe")
-    check_is_refused(name, tmp_path / f"zero{suffix}", "a device")
-    check_is_refused(name, tmp_path / f"folder{suffix}", "a directory")
-    check_is_refused(name, tmp_path / f"none{suffix}", "none")
+    check_is_refused(name, tmp_path / f"pipe{suffix}", "found a pipe")
+    check_is_refused(name, tmp_path / f"zero{suffix}", "found a device")
+    check_is_refused(name, tmp_path / f"folder{suffix}", "found a directory")
+    check_is_refused(name, tmp_path / f"none{suffix}", "there is no such file")
     assert "cannot be read" in str(complaint(READERS[name], tmp_path / f"s{suffix}"))
-    must_fail(check_is_refused, name, tmp_path / f"folder{suffix}", "a pipe")
+    must_fail(check_is_refused, name, tmp_path / f"folder{suffix}", "found a pipe")
 
 
 @pytest.mark.parametrize("name", ["a" * 5000, "a\0b.csv", "\ud800.csv", "a" * 300 + ".smrl"])

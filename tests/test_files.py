@@ -69,7 +69,7 @@ def test_a_link_stays_a_link(tmp_path):
 def test_what_cannot_be_written_is_said_beforehand(tmp_path):
     check_writable(tmp_path / "new")
     assert list(tmp_path.iterdir()) == []
-    with pytest.raises(OSError, match="found a directory"):
+    with pytest.raises(OSError, match="it is a directory, not a file"):
         check_writable(tmp_path)
     with pytest.raises(OSError, match="no folder"):
         check_writable(tmp_path / "none" / "out")
@@ -125,8 +125,8 @@ def check_kept(path):
         for write in (check_writable, lambda path: atomic_write(path).__enter__()):
             message = complaint(write, path)
             assert message is not None
-            assert message.startswith(f"{path}: expected a new name")
-            assert message.endswith("; --overwrite replaces it")
+            assert message.startswith(f"{path}: there is already a file of this name")
+            assert message.endswith(": choose another name, or replace it with --overwrite")
     assert path.read_bytes() == before
 
 
@@ -184,7 +184,7 @@ def test_a_file_that_appears_meanwhile_is_kept(tmp_path):
             out.write(b"SMRL new")
             path.write_bytes(b"somebody else's")
 
-    with pytest.raises(OptionError, match="found another file; --overwrite replaces it"):
+    with pytest.raises(OptionError, match="which Sommerl did not write: choose another name"):
         write()
     assert path.read_bytes() == b"somebody else's"
     assert list(tmp_path.iterdir()) == [path]
@@ -221,7 +221,7 @@ def test_sockets_are_refused(tmp_path):
     with socket.socket(socket.AF_UNIX) as listening:
         listening.bind(str(tmp_path / "x.smrl"))
         for write in (check_writable, lambda path: atomic_write(path).__enter__()):
-            with pytest.raises(OSError, match="expected a file to write, found a socket"):
+            with pytest.raises(OSError, match="cannot be written: it is a socket, not a file"):
                 write(tmp_path / "x.smrl")
     assert stat.S_ISSOCK((tmp_path / "x.smrl").stat().st_mode)
 

@@ -12,7 +12,7 @@ import pytest
 from helpers import must_fail
 
 from sommerl import builtin
-from sommerl.system.interrupt import undisturbed
+from sommerl.system.interrupt import hold_interrupts
 
 INTERRUPTED = "error: interrupted; nothing was left half-written\n"
 PROGRAM = """
@@ -73,10 +73,10 @@ def test_two_signals_at_once_are_one():
 STUBBORN = """
     import os
     from sommerl.system.files import atomic_write
-    from sommerl.system.interrupt import undisturbed
+    from sommerl.system.interrupt import hold_interrupts
     with atomic_write(Path("out")) as out:
         out.write(b"half"); out.flush()
-        with undisturbed():
+        with hold_interrupts():
             print(flush=True)
             for _ in range(600): time.sleep(0.1)
 """
@@ -163,9 +163,9 @@ def test_an_interruption_waits_for_the_end_of_the_block():
     signal.signal(signal.SIGINT, signal.default_int_handler)
     reached = []
 
-    @undisturbed()
+    @hold_interrupts()
     def interrupted(error):
-        with undisturbed():  # one within another changes nothing
+        with hold_interrupts():  # one within another changes nothing
             os.kill(os.getpid(), signal.SIGINT)
             time.sleep(0.01)
         reached.append(error)
@@ -176,7 +176,7 @@ def test_an_interruption_waits_for_the_end_of_the_block():
         with pytest.raises(KeyboardInterrupt):
             interrupted(error)
     assert reached == [False, True]
-    with pytest.raises(RuntimeError), undisturbed():
+    with pytest.raises(RuntimeError), hold_interrupts():
         raise RuntimeError
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 

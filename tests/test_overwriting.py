@@ -46,8 +46,8 @@ def check_kept(capsys, options, path):
     before = path.read_bytes()
     status, out, err = run(capsys, *options)
     assert (status, out) == (2, "")
-    assert err.startswith(f"error: {path}: expected a new name")
-    assert err.endswith("; --overwrite replaces it\n")
+    assert err.startswith(f"error: {path}: there is already a file of this name")
+    assert err.endswith(": choose another name, or replace it with --overwrite\n")
     assert path.read_bytes() == before
 
 

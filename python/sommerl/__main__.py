@@ -7,7 +7,7 @@ import os
 import sys
 from collections.abc import Callable
 
-from .system.interrupt import STATUS, heed, remove_temporaries, undisturbed, unheeded
+from .system.interrupt import STATUS, handle_signals, hold_interrupts, ignore_signals, remove_temporaries
 
 
 def main() -> int:
@@ -18,16 +18,16 @@ def main() -> int:
     """
     outputs = _open_streams()
     try:
-        heed()
-        with undisturbed():
+        handle_signals()
+        with hold_interrupts():
             from .commands.cli import main as run
             from .commands.outcome import fail, settled
         status = _status(run) if outputs else fail("standard output: expected it open, found it closed", 1)
     except KeyboardInterrupt:
-        unheeded()
+        ignore_signals()
         _interrupted()
         os._exit(STATUS)
-    unheeded()
+    ignore_signals()
     if not settled() and status == 0:
         return fail("standard output: cannot be written", 1)
     return status

@@ -96,7 +96,7 @@ def test_json_by_the_resolver(folder):
     assert "snippet('grey.json')" in found["comment"]
     mi = mitsuba()
     register()
-    with pytest.raises(RuntimeError, match="found none"):
+    with pytest.raises(RuntimeError, match="there is no such file"):
         mi.load_dict(found)
     before = mi.file_resolver()
     mi.set_file_resolver(mi.FileResolver(before))

@@ -64,7 +64,7 @@ def check_set_aside(path, content):
     state, said = loaded(path)
     assert (state.images, state.total, state.passes) == ((), None, 0)
     assert len(said) == 1
-    assert said[0].startswith(f"{path}: expected ")
+    assert said[0].startswith(f"{path}: it is damaged or not a checkpoint (")
     assert said[0].endswith(f"; it is kept as {path.name}.damaged, and the render starts anew")
     assert said[0].isprintable()
     assert not path.exists()
@@ -140,7 +140,7 @@ def test_another_shape_is_another_render_or_none(tmp_path):
     whole = path.read_bytes()
     state, said = loaded(path)
     assert state.images == ()
-    assert "expected the same render, found another material" in said[0]
+    assert "it is of a render with another material" in said[0]
     assert path.read_bytes() == whole
 
 
@@ -177,12 +177,12 @@ def test_a_second_damaged_file_and_one_that_cannot_be_set_aside(tmp_path, monkey
     kept.save(STATE, now=True)
     kept.remove()
     assert len(said) == 1
-    assert said[0].endswith("the render starts anew, and keeps nothing (Permission denied)")
+    assert said[0].endswith("the render starts anew, without checkpoints (Permission denied)")
     assert path.read_bytes() == b"SMRP?"
 
 
 def test_what_is_no_file_is_refused(tmp_path):
-    with pytest.raises(OptionError, match="expected a checkpoint or nothing, found something else"):
+    with pytest.raises(OptionError, match="the render's checkpoint needs this name"):
         Checkpoint(tmp_path, IDENTITY, SHAPE, print)
 
 

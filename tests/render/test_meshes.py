@@ -193,7 +193,7 @@ def test_broken_ones_are_refused_by_one_sentence(tmp_path, name):
 
 
 def test_missing_ones_too(tmp_path):
-    with pytest.raises(FormatError, match="expected a mesh, found none"):
+    with pytest.raises(FormatError, match="there is no such file"):
         load_mesh(tmp_path / "none.obj")
     with pytest.raises(FormatError, match="found a directory"):
         load_mesh(tmp_path)

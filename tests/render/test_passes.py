@@ -86,8 +86,8 @@ def test_another_render_starts_anew_and_says_so(job, options, what):
         job(3)
     pixels, kept = job(**options)
     assert not kept.resumed
-    anew = "this one starts anew, and replaces it after 0 s"
-    assert job.said == [f"{job.path}: expected the same render, found another {what}; {anew}"]
+    anew = "this render starts anew, and replaces it after 0 s"
+    assert job.said == [f"{job.path}: it is of a render with another {what}; {anew}"]
     assert np.array_equal(pixels, job(resume=False, **options)[0])
     kept.remove()
     assert not job.path.exists()
@@ -126,7 +126,7 @@ def test_a_broken_checkpoint_is_ignored_and_named(job, number):
     assert not kept.resumed
     (sentence,) = job.said
     check_sentence(sentence, str(job.path))
-    assert "found a damaged one" in sentence
+    assert "it is damaged or not a checkpoint" in sentence
     assert np.array_equal(pixels, job(resume=False)[0])
 
 

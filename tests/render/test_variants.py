@@ -164,7 +164,7 @@ def test_a_variant_that_is_not_supported_is_refused_with_those_that_are(name):
 
 def test_an_llvm_that_will_not_do_is_told_before_mitsuba_ends_the_process(monkeypatch):
     monkeypatch.setattr(llvm.jit, "has_llvm", lambda dr: False)
-    with pytest.raises(MissingDependencyError, match="Mitsuba's variant llvm_ad_rgb: expected a libLLVM 17 or newer"):
+    with pytest.raises(MissingDependencyError, match="Mitsuba's variant llvm_ad_rgb needs libLLVM 17 or newer"):
         llvm._check.__wrapped__("llvm_ad_rgb")
 
 

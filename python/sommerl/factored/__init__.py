@@ -1,1 +1,1 @@
-"""Factored BRDFs: Lawrence, Rusinkiewicz & Ramamoorthi 2004, the paper's main rival."""
+"""Factored BRDFs (Lawrence, Rusinkiewicz & Ramamoorthi 2004), which the paper compares its method with."""

@@ -1,13 +1,13 @@
-"""Files of factored BRDFs (.fbrdf), format 1: docs/format.md has every byte.
+"""Writes and reads files of factored BRDFs (.fbrdf), format 1. docs/format.md specifies every byte.
 
-The body, after what `sealed_file` writes:
+The body, which follows the head that `sealed_file` writes:
 
     bytes  what
     1, …   length of the name, and the name in UTF-8
     1, …   32 and the SHA-256 of the source, or 0
     1, 1   J, K
-    …      a deflate stream: F, u and v in half precision, all their low bytes before all their high ones; the scales
-           in single precision
+    …      a deflate stream: F, u and v in half precision, first the low bytes of all numbers and then their high
+           bytes; the scales in single precision
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from .material import COLUMNS, ELEVATIONS, MOST, ROWS, FactoredBrdf
 MAGIC = b"FBRD"
 VERSION = 1
 TERMS = struct.Struct("<BB")
-LONGEST_FILE = 2**20
+LONGEST_FILE = 2**20  # bytes
 
 
 def looks_like(head: bytes) -> bool:
-    """Whether a file that starts with these bytes says that it is a factored BRDF."""
+    """Whether a file that begins with these bytes is a factored BRDF, by its magic number."""
     return head.startswith(MAGIC)
 
 
@@ -50,11 +50,11 @@ def load(path: str | Path) -> FactoredBrdf:
 
 def parse(path: Path, data: bytes) -> FactoredBrdf:
     """The same of a file's bytes."""
-    return sealed_file.named(path, data, decode)
+    return sealed_file.decode_file(path, data, decode)
 
 
 def encode(material: FactoredBrdf) -> bytes:
-    """The bytes of a file. The same material always gives the same bytes."""
+    """The bytes of a material's file; always the same for the same material."""
     halves = np.concatenate([part.reshape(-1) for part in (material.lobes, material.rows, material.columns)])
     planes = halves.astype("<f2").view(np.uint8).reshape(-1, 2).T
     stream = sealed_file.deflated(planes.tobytes() + material.scale.astype("<f4").tobytes())
@@ -63,7 +63,7 @@ def encode(material: FactoredBrdf) -> bytes:
 
 
 def decode(data: bytes) -> FactoredBrdf:
-    """The factored BRDF in the bytes of a file. Raises FormatError."""
+    """Reads a factored BRDF from the bytes of a file. Raises FormatError if they are not a valid file."""
     reader = sealed_file.opened(data, MAGIC, VERSION, "factored BRDF (.fbrdf)")
     try:
         return _material(reader)

@@ -1,4 +1,4 @@
-"""Factorisation of a BRDF into products of small tables."""
+"""Factors a BRDF into products of small tables (Lawrence, Rusinkiewicz & Ramamoorthi 2004)."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from ..system.errors import OptionError
 from ..system.optional import optional
 from .material import COLUMNS, ELEVATIONS, LEAST_COSINE, MOST, MOST_TERMS, PI, ROWS, FactoredBrdf
 
-FIRST_ITERATIONS, ITERATIONS = 200, 100
-BELOW = 0.01  # weight of half vectors that mirror the viewer below the horizon
-DARK = 1e-4  # of the largest value: what is darker does not count more
+FIRST_ITERATIONS, ITERATIONS = 200, 100  # of the first factorisations at most, and of all factors together
+BELOW = 0.01  # the weight of half vectors that mirror the viewer below the horizon
+DARK = 1e-4  # of the largest value: darker rows and columns are not scaled up further
 TINY = 1e-300  # added to divisors that may be 0
 
 Matrix = NDArray[np.float64]
@@ -27,7 +27,7 @@ Progress = Callable[[int, int], None]  #: iterations done, iterations in all
 
 @dataclass(frozen=True)
 class FactorOptions:
-    """lobes: J. terms: K, of each lobe. Raises OptionError out of range."""
+    """lobes: J. terms: K, of each lobe. Raises OptionError for values out of range."""
 
     lobes: int = 16
     terms: int = 4
@@ -37,16 +37,20 @@ class FactorOptions:
             if not 1 <= value <= MOST:
                 raise OptionError(f"{name}: expected 1 to {MOST}, found {value}")
         if self.lobes * self.terms > MOST_TERMS:
-            raise OptionError(f"terms: expected at most {MOST_TERMS} of all lobes, found {self.lobes * self.terms}")
+            raise OptionError(
+                f"terms: expected at most {MOST_TERMS} for all lobes together, found {self.lobes * self.terms}"
+            )
 
 
 def factor(brdf: Brdf, options: FactorOptions | None = None, *, progress: Progress | None = None) -> FactoredBrdf:
     """Factors a BRDF, which is evaluated for 138,240 pairs of directions.
 
-    As Lawrence et al. (2004) do, the matrix of elevations by half vectors is factored first, then each lobe's table of
-    θ_h by φ_h, with rows and columns scaled so that the dark ones count. The iterations after it are our own: they fit
-    all factors together. What is below the horizon, which no evaluation reads, is to be 0, so that sampling draws
-    little of it, but counts little, so that it costs little accuracy. Raises MissingDependencyError without
+    As in Lawrence et al. (2004), the matrix of elevations by half vectors is factored first, and then each lobe's table
+    of θ_h by φ_h. Rows and columns are scaled so that dark ones count, too. Our own addition are the iterations after
+    that, which improve all factors together. Half vectors that mirror the viewer below the horizon are fitted to 0, so
+    that samplers draw few of them, but with a small weight, since no evaluation reads them.
+
+    progress: called with the iterations done and the iterations in all. Raises MissingDependencyError without
     scikit-learn.
     """
     options = options or FactorOptions()
@@ -67,8 +71,8 @@ def factor(brdf: Brdf, options: FactorOptions | None = None, *, progress: Progre
 
 
 def _light(brdf: Brdf) -> tuple[Matrix, NDArray[np.bool_]]:
-    """f_r max(cos θ_i, C) in the middles of all intervals, 0 where the light is below the horizon, and where it is not:
-    shape (ELEVATIONS · 3, ROWS · COLUMNS)."""
+    """f_r max(cos θ_i, C) at the middles of all intervals, 0 where the light is below the horizon; and whether the
+    light is above it. Both have the shape (ELEVATIONS · 3, ROWS · COLUMNS)."""
     theta_h = ((np.arange(ROWS) + 0.5) / ROWS) ** 2 * PI / 2
     phi_h = (np.arange(COLUMNS) + 0.5) / COLUMNS * PI
     theta_o = (np.arange(ELEVATIONS) + 0.5) / ELEVATIONS * PI / 2
@@ -82,7 +86,7 @@ def _light(brdf: Brdf) -> tuple[Matrix, NDArray[np.bool_]]:
 
 
 def _scales(data: Matrix) -> tuple[Matrix, Matrix]:
-    """Factors for the rows and for the columns, whose means are then alike; finite ones for black data."""
+    """Factors that make the means of rows, and those of columns, about equal. They are finite even for black data."""
     least = DARK * data.max() or 1.0
     columns = 1 / np.maximum(data.mean(axis=0, keepdims=True), least)
     return 1 / np.maximum((data * columns).mean(axis=1, keepdims=True), DARK), columns
@@ -93,13 +97,13 @@ def _nmf(matrix: Matrix, rank: int) -> tuple[Matrix, Matrix]:
     decomposition = optional("sklearn.decomposition", "scikit-learn", "factorisation", "fit")
     model = decomposition.NMF(rank, init="nndsvda", max_iter=FIRST_ITERATIONS, tol=1e-5, random_state=0)
     with warnings.catch_warnings():
-        # It has not converged by then, and need not: it is where `_refined` starts.
+        # It need not converge: `_refined` continues from its result.
         warnings.filterwarnings("ignore", "Maximum number of iterations")
         return model.fit_transform(matrix), model.components_
 
 
 def _split(lobe: Matrix, terms: int) -> tuple[Matrix, Matrix]:
-    """u (ROWS, K) and v (COLUMNS, K) of one lobe's table."""
+    """Factors one lobe's table into u (ROWS, K) and v (COLUMNS, K)."""
     scale = 1 / np.maximum(lobe.mean(axis=1, keepdims=True), DARK * lobe.mean() or 1.0)
     u, v = _nmf(lobe * scale, terms)
     return u / scale, v.T
@@ -108,11 +112,11 @@ def _split(lobe: Matrix, terms: int) -> tuple[Matrix, Matrix]:
 def _refined(
     data: Matrix, weights: Matrix, f: Matrix, u: Matrix, v: Matrix, progress: Progress | None
 ) -> tuple[Matrix, Matrix, Matrix]:
-    """Multiplicative updates (Lee & Seung 2001) of each factor in turn, for the weighted squared error."""
+    """Reduces the weighted squared error by multiplicative updates (Lee & Seung 2001) of each factor in turn."""
     target = weights * data
 
     def gradients(f: Matrix, u: Matrix, v: Matrix) -> tuple[Matrix, Matrix]:
-        """Of G, the part of the data and that of the present factors: shape (J, ROWS, COLUMNS)."""
+        """The two parts of the gradient by G: of the data, and of the present factors; (J, ROWS, COLUMNS) each."""
         now = weights * (f @ _lobes(u, v))
         return (f.T @ target).reshape(-1, ROWS, COLUMNS), (f.T @ now).reshape(-1, ROWS, COLUMNS)
 
@@ -129,5 +133,5 @@ def _refined(
 
 
 def _lobes(u: Matrix, v: Matrix) -> Matrix:
-    """G, (J, ROWS · COLUMNS)."""
+    """The lobes G, (J, ROWS · COLUMNS)."""
     return np.einsum("rjk,cjk->jrc", u, v).reshape(u.shape[1], -1)

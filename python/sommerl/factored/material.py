@@ -5,8 +5,8 @@ the half vector's angles θ_h and φ_h, where φ_h is counted from the viewer's 
 
     f_r max(cos θ_i, C) = Σ_j F_j(θ_o) G_j(θ_h, φ_h),   G_j = Σ_k u_jk(θ_h) v_jk(φ_h)
 
-with the colours in F. Without the bound C, what is next to the horizon would be divided by a cosine of nearly 0, and
-the fit's error there with it. The representation is not reciprocal: nothing makes it so.
+F is different for each channel, G is not. Without the bound C, an evaluation next to the horizon would divide by a
+cosine of nearly 0, and enlarge the error of the fit. This representation is not reciprocal.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from ..reflectance.distance import asymmetry
 from ..reflectance.origin import Source
 from ..system.errors import MaterialError
 
-ELEVATIONS = 32  # intervals of θ_o, equal in angle
-ROWS, COLUMNS = 90, 48  # of θ_h, equal in √θ_h as MERL's bins are; of φ_h, equal in angle over half of the circle
+ELEVATIONS = 32  # intervals of θ_o, of equal size
+ROWS, COLUMNS = 90, 48  # intervals of θ_h, equal in √θ_h as MERL's bins are; of φ_h, equal, over half of the circle
 LEAST_COSINE = 0.03  # C
 UPRIGHT = 1e-9  # added to lengths along x, so that the azimuth of the normal itself is defined
 PI = np.pi
-MOST, MOST_TERMS = 32, 256  # lobes, and terms of a lobe; terms of all lobes, each of which is looked up
+MOST, MOST_TERMS = 32, 256  # of lobes, and of terms of a lobe; of terms of all lobes, which a lookup all reads
 LARGEST_SCALE = 1e30  # renderers calculate in single precision
 
 
@@ -58,7 +58,7 @@ class FactoredBrdf(Brdf):
         shapes = (ELEVATIONS, *terms[:1], 3), (ROWS, *terms), (COLUMNS, *terms)
         if len(terms) != 2 or 0 in terms or (lobes.shape, rows.shape, columns.shape) != shapes:
             found = ", ".join(str(part.shape) for part in (lobes, rows, columns, scale))
-            raise MaterialError(f"factors: expected shapes that fit together, found {found}")
+            raise MaterialError(f"factors: their shapes do not fit together: {found}")
         if not all(((part >= 0) & (part <= 1)).all() for part in (lobes, rows, columns)):
             raise MaterialError("factors: expected values from 0 to 1, found others")
         if max(terms) > MOST or scale.size > MOST_TERMS:
@@ -119,7 +119,7 @@ class FactoredBrdf(Brdf):
 
 
 def half_from_viewer(wi: Triple, wo: Triple) -> tuple[Array, Array]:
-    """θ_h, and φ_h from the viewer's azimuth to either side, from 0 to π [rad]."""
+    """θ_h, and φ_h measured from the viewer's azimuth to either side, from 0 to π [rad]."""
     f = ops(wi[0])
     hx, hy, hz = wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]
     x, y = wo[0] + UPRIGHT, wo[1]
@@ -143,7 +143,7 @@ def elevation_of(wo: Triple) -> Array:
 
 
 def between_middles(place: Array, count: int) -> tuple[Array, Array]:
-    """The first of two neighbouring intervals whose middles a place is between, and the second one's share."""
+    """The first of the two neighbouring intervals whose middles a place lies between, and the share of the second."""
     f = ops(place)
     from_first = f.minimum(f.maximum(place - 0.5, 0.0), count - 1.0)
     first = f.bin(from_first, count - 1)
@@ -151,5 +151,6 @@ def between_middles(place: Array, count: int) -> tuple[Array, Array]:
 
 
 def _lerp(gather: Any, buffer: Any, stride: int, first: Array, t: Array, offset: int) -> Array:
+    """Interpolates linearly between rows `first` and `first` + 1 of a flat table, in one of its `stride` columns."""
     a, b = (gather(buffer, stride * (first + step) + offset) for step in (0, 1))
     return a + t * (b - a)

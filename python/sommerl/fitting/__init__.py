@@ -1,4 +1,4 @@
-"""Analytic models fitted to materials. Needs SciPy and Dr.Jit: sommerl[fit]."""
+"""Fits analytic models to materials. Needs SciPy and Dr.Jit: sommerl[fit]."""
 
 from .fit import Fit, fit, fit_all, fit_models
 from .options import FitOptions

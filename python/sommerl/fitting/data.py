@@ -1,4 +1,4 @@
-"""What a model is fitted to: a material's reflectance along many pairs of directions."""
+"""The samples that a model is fitted to: a material's reflectance for many pairs of directions."""
 
 from __future__ import annotations
 
@@ -11,35 +11,40 @@ from ..reflectance.samples import Samples
 from ..system.errors import MaterialError
 from .options import FitOptions
 
-DARKEST, BRIGHTEST = 1e-15, 1e15  # [1/sr], of what is largest: squares keep their digits between these
-DIAMETER = 230  # of a sphere, in pixels: nine tenths of a picture of 256
+DARKEST, BRIGHTEST = 1e-15, 1e15  # [1/sr], of the largest sample: beyond these, squares would lose precision
+DIAMETER = 230  # of the sphere in pixels: nine tenths of a picture of 256 pixels
 
 
 def samples_of(brdf: Brdf, options: FitOptions) -> Samples:
-    """A material's. Raises MaterialError if a value is negative or not a number, or all are 0 or nearly so."""
+    """The samples of a material in the directions that the options ask for.
+
+    Raises MaterialError if a value is negative or not finite, if all are 0, or if the largest is not from DARKEST to
+    BRIGHTEST.
+    """
     wi, wo = sphere(options.samples, options.seed) if options.sampling == "sphere" else lattice(brdf)
     f_r = brdf.eval(wi, wo)
     unusable = int((~(np.isfinite(f_r) & (f_r >= 0))).any(axis=-1).sum())
     if unusable:
         raise MaterialError(
-            f"{brdf.name}: expected finite reflectance of at least 0, found others in {unusable} of {len(wi)} "
-            "directions"
+            f"{brdf.name}: no model can be fitted to it, since its reflectance is negative or not finite in "
+            f"{unusable} of {len(wi)} directions"
         )
     if not f_r.any():
-        raise MaterialError(f"{brdf.name}: expected a positive reflectance in some direction, found none")
+        raise MaterialError(f"{brdf.name}: no model can be fitted to it, since it is black")
     if not DARKEST <= f_r.max() <= BRIGHTEST:
         raise MaterialError(
-            f"{brdf.name}: expected a largest reflectance of {DARKEST:g} to {BRIGHTEST:g}, found {f_r.max():g}"
+            f"{brdf.name}: no model can be fitted to it, since its largest reflectance is {f_r.max():g}, not from "
+            f"{DARKEST:g} to {BRIGHTEST:g}"
         )
     return Samples(wi, wo, f_r)
 
 
 def sphere(count: int, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Pairs of directions as a rendered sphere sees them, (n, 3) each, in random order.
+    """Pairs of directions as they occur on a rendered sphere, (count, 3) each, in random order.
 
-    The viewer is far away, and looks at the centres of those pixels that show nothing but the sphere, which end at
-    θ_o = 84.7°: what is nearer to the edge grows without bound in many a model and material, and is seen in no picture.
-    At each pixel, light comes from a direction drawn by the cosine.
+    The viewer is far away, and sees the centres of all pixels that lie completely on the sphere. These end at
+    θ_o = 84.7°; pixels nearer to the edge are left out, since many models and materials grow without bound there, and
+    no picture shows it. For each pixel, the direction to the light is drawn with a density in proportion to its cosine.
     """
     random = np.random.Generator(np.random.PCG64(seed))
     places = (np.arange(DIAMETER) + 0.5) / DIAMETER * 2 - 1
@@ -52,7 +57,7 @@ def sphere(count: int, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float
 
 
 def lattice(brdf: Brdf) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The pairs of directions of all cell centres above the horizon, (n, 3) each, in an order that has no pattern."""
+    """The pairs of directions at the centres of all cells above the horizon, (n, 3) each, in random order."""
     cells = brdf.table_lattice
     chosen = np.flatnonzero(cells.above_horizon)
     order = np.random.Generator(np.random.PCG64(0)).permutation(chosen)

@@ -1,4 +1,4 @@
-"""Analytic models fitted to a material; `sommerl fit`."""
+"""Fits analytic models to a material, as `sommerl fit` does."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ Progress = Callable[[int, int], None]  #: steps done, steps in all
 
 @dataclass(frozen=True)
 class Start:
-    """Where a search started: the shape of each lobe, and the error, over all samples, of what it found on a part of
-    them, before the best were refined."""
+    """One starting point of a search. shapes: the parameters of each lobe. error: over all samples, of what was found
+    from there with a part of the samples, before the best results were refined."""
 
     shapes: list[dict[str, float]]
     error: float
@@ -30,8 +30,8 @@ class Start:
 class Fit:
     """The best fit of a model to a material.
 
-    error: what the options' loss measures. relative_error: as a share of the root of the mean square of the samples.
-    starts: all that were tried. samples: number of pairs of directions. seconds: that the search took.
+    error: as the options' loss measures it. relative_error: the error divided by the root mean square of the samples.
+    starts: all starting points. samples: the number of pairs of directions. seconds: the time of the search.
     """
 
     model: str
@@ -44,7 +44,7 @@ class Fit:
     seconds: float
 
     def as_json(self) -> dict[str, Any]:
-        """Everything, for a file or for --json."""
+        """Everything as plain values, for a file or for --json."""
         return {
             "model": self.model,
             "lobes": len(self.brdf.lobes),
@@ -65,14 +65,14 @@ class Fit:
 def fit(brdf: Brdf, model: str, options: FitOptions | None = None, *, progress: Progress | None = None) -> Fit:
     """Fits one model to a material.
 
-    Raises OptionError for an unknown model, or one that cannot have so many lobes, and MaterialError for a material
-    that is black or not finite.
+    progress: called with the steps done and the steps in all. Raises OptionError for an unknown model, or one that
+    cannot have the number of lobes asked for; MaterialError for a material that cannot be fitted, like a black one.
     """
     return fit_models(brdf, [model], options, progress=progress)[0]
 
 
 def fit_all(brdf: Brdf, options: FitOptions | None = None, *, progress: Progress | None = None) -> list[Fit]:
-    """Fits all models that can have so many lobes, and the diffuse ones by themselves; the best first."""
+    """Fits all models that can have the number of lobes asked for, and the diffuse ones; sorted, the best first."""
     models = all_models((options or FitOptions()).lobes)
     return sorted(fit_models(brdf, models, options, progress=progress), key=lambda found: found.error)
 
@@ -80,9 +80,9 @@ def fit_all(brdf: Brdf, options: FitOptions | None = None, *, progress: Progress
 def fit_models(
     brdf: Brdf, models: Sequence[str], options: FitOptions | None = None, *, progress: Progress | None = None
 ) -> list[Fit]:
-    """Fits several models to one set of samples, in their order. Of several, diffuse ones have one lobe.
+    """Fits several models to the same samples; returns the fits in the same order. See `families_of` for lobes.
 
-    Raises the errors of `fit`.
+    Raises the same errors as `fit`.
     """
     options = options or FitOptions()
     sums = [families_of(model, options.lobes, alone=len(models) == 1) for model in models]

@@ -1,8 +1,8 @@
-"""The distance between a sum of lobes and samples of a material, with its exact derivatives.
+"""The error of a sum of lobes as a fit to samples of a material, with its exact derivatives.
 
-Dr.Jit evaluates the lobes and differentiates them by their shapes, in one compiled pass over the samples; what is left
-is linear algebra. A lobe's albedos are linear in f_r, so for losses that are linear in f_r, too, the best albedos for
-given shapes are those of a non-negative least squares problem of the size of the number of lobes.
+Dr.Jit evaluates the lobes and their derivatives by the shapes in one compiled pass over the samples; the rest is linear
+algebra. f_r is linear in the albedos. So for losses that are linear in f_r, the best albedos for given shapes are the
+solution of a non-negative least-squares problem with one unknown for each lobe.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from .options import Loss
 Matrix = NDArray[np.float64]
 
 LOG_EPSILON = 1e-3  # [1/sr]
-SMALLEST_ROOT = 1e-12  # where the cube root's slope is cut off
-UNSEEN = 1e-12  # a lobe that is that much darker than the brightest in all samples gets no light
-RANK = 1e-13  # eigenvalues below that share of the largest are rounding
-HEAVY = 1e6  # weight of an equation that is to hold exactly
+SMALLEST_ROOT = 1e-12  # below this, the cube root is taken to be constant, since its slope has no bound at 0
+UNSEEN = 1e-12  # a lobe that is darker than this share of the brightest one, in all samples, gets the albedo 0
+RANK = 1e-13  # eigenvalues below this share of the largest are taken for rounding errors
+HEAVY = 1e6  # the weight of an equation that has to hold exactly
 
 
 @dataclass(frozen=True)
 class Value:
-    """The squared distance, as a share of the samples' squared length, and its derivatives by albedos (lobes, 3) and by
-    the places of all shape parameters."""
+    """distance: the sum of squared differences divided by the sum of squared samples. by_albedos (lobes, 3), by_places:
+    its derivatives by the albedos, and by the places of all shape parameters."""
 
     distance: float
     by_albedos: Matrix
@@ -42,9 +42,9 @@ class Value:
 
 
 class Objective:
-    """families: of the lobes. samples: what they are compared with.
+    """The distance between samples and a sum of lobes of given families.
 
-    Places are those of `Parameter.place`, lobe after lobe; albedos have the shape (lobes, 3).
+    In all methods, places are those of `Parameter.place`, lobe after lobe, and albedos have the shape (lobes, 3).
     """
 
     def __init__(self, families: Sequence[Family], samples: Samples, loss: Loss) -> None:
@@ -56,7 +56,9 @@ class Objective:
         self._loss = loss
         wi, wo = (tuple(self._float(component.copy()) for component in split(w)) for w in (samples.wi, samples.wo))
         self._angles = a = Angles(wi, wo)
-        self._dr.eval(a.cos_h, a.sin_h, a.tan2_h, a.theta_h, a.cos_d, a.along)  # once, and not with every lobe
+        self._dr.eval(
+            a.cos_h, a.sin_h, a.tan2_h, a.theta_h, a.cos_d, a.along
+        )  # computed once, not again for every lobe
         self._owner = [lobe for lobe, family in enumerate(families) for _ in family.parameters]
         self._weight = self._float(1.0) if loss == "l2" else a.cos_i
         measured = [self._float(channel.copy()) * self._weight for channel in samples.f_r.T]
@@ -65,7 +67,7 @@ class Objective:
         targets = np.stack([t.numpy() for t in self._target])
         self._squared = float((targets**2).sum())
         lobes, shapes = len(families), len(self.parameters)
-        # Rows: lobes; their derivatives; samples or, if the loss is not linear, what derivatives are multiplied by.
+        # Rows: lobes; their derivatives; samples or, if the loss is not linear, factors of the derivatives.
         self._rows = np.empty((lobes + shapes + 3, len(samples.wi)))
         self._rows[-3:] = targets
         for lobe, family in enumerate(families):
@@ -74,19 +76,19 @@ class Objective:
 
     @property
     def count(self) -> int:
-        """How many numbers are compared."""
+        """The number of values that are compared: three for each sample."""
         return 3 * self._rows.shape[1]
 
     @property
     def scale(self) -> float:
-        """The root of the mean square of the samples, as the loss sees them."""
+        """The root mean square of the samples in the domain of the loss."""
         return sqrt(self._squared / self.count)
 
     def solved(self, places: NDArray[np.float64], most: float | None = None) -> tuple[Matrix, Value]:
-        """The best albedos for these shapes, none negative, each channel's sum at most `most`; and the distance.
+        """The best albedos for given shapes, and the distance. Only for losses that are linear in f_r.
 
-        Only for losses that are linear in f_r. The derivative by the places is the one with the albedos following,
-        since the derivative by the albedos is zero, or they are at a bound (the envelope theorem).
+        No albedo is negative, and those of a channel add up to at most `most`. The derivative by the places already
+        includes that the best albedos change with them: at their optimum, this has no effect (the envelope theorem).
         """
         self._evaluate(places)
         moments, lobes = self._rows @ self._rows.T, len(self.families)
@@ -94,14 +96,14 @@ class Objective:
         return albedos, self._linear(moments, albedos)
 
     def value(self, places: NDArray[np.float64], albedos: Matrix) -> Value:
-        """The distance for these shapes and albedos."""
+        """The distance for given shapes and albedos."""
         if self.linear:
             self._evaluate(places)
             return self._linear(self._rows @ self._rows.T, albedos)
         return self._non_linear(places, albedos)
 
     def first_albedos(self, places: NDArray[np.float64], most: float | None = None) -> Matrix:
-        """The best albedos if the loss were the straight line that touches it at the samples."""
+        """The best albedos for given shapes if the loss is linearised at the samples: a start for the search."""
         self._evaluate(places)
         lobes = len(self.families)
         columns: list[Matrix] = []
@@ -113,8 +115,8 @@ class Objective:
         return np.concatenate(columns, axis=1)
 
     def error(self, places: NDArray[np.float64], albedos: Matrix) -> float:
-        """The root of the mean square of the differences, added up one by one: what the distance loses to rounding
-        where samples and model agree to more than seven digits is here."""
+        """The root mean square of the differences. They are added up one by one, so that it is exact even if samples
+        and model agree to more than seven digits, where the distance has only rounding errors left."""
         modelled = self._modelled(places, albedos)
         differences = [self._mapped(m) - t for m, t in zip(modelled, self._target, strict=True)]
         return sqrt(sum(float((d.numpy() ** 2).sum()) for d in differences) / self.count)
@@ -144,7 +146,7 @@ class Objective:
         return Value(squared / self._squared, 2 * moments[:lobes] / self._squared, by_places / self._squared)
 
     def _modelled(self, places: NDArray[np.float64], albedos: Matrix) -> list[Array]:
-        """f_r of the lobes, weighted; a channel at a time."""
+        """The sum of the lobes, times the weight (cos θ_i or 1): one array for each channel."""
         lobes = self._evaluate(places)
         known = [self._float(row) if lobe is None else lobe for lobe, row in zip(lobes, self._rows, strict=False)]
         opaque = [[self._float([albedo]) for albedo in column] for column in albedos.T]
@@ -152,7 +154,7 @@ class Objective:
         return [sum((a * s for a, s in zip(column, known, strict=True)), start=self._float(0.0)) for column in opaque]
 
     def _evaluate(self, places: NDArray[np.float64]) -> list[Any]:
-        """Fills the rows of the lobes and of their derivatives; returns the lobes, None for those without a shape."""
+        """Fills the rows of lobes and derivatives; returns the lobes, and None for those without parameters."""
         dr = self._dr
         found: list[Any] = []
         derivatives: list[Any] = []
@@ -162,7 +164,7 @@ class Objective:
             value = None
             for chosen in range(len(mine)):
                 at = [self._float([place]) for place in mine]
-                dr.make_opaque(at)  # the same kernel for all places
+                dr.make_opaque(at)  # so that all places use the same compiled kernel
                 dr.enable_grad(at[chosen])
                 shape = [p.at(place) for p, place in zip(family.parameters, at, strict=True)]
                 lobe = family.lobe(self._angles, *shape) * self._weight
@@ -178,6 +180,7 @@ class Objective:
         return found
 
     def _mapped(self, f_r: Array) -> Array:
+        """Weighted f_r in the domain of the loss."""
         match self._loss:
             case "log":
                 return self._dr.log(1.0 + f_r / LOG_EPSILON)
@@ -187,6 +190,7 @@ class Objective:
                 return f_r
 
     def _unmapped(self, mapped: Array) -> Array:
+        """The inverse of `_mapped`."""
         match self._loss:
             case "log":
                 return LOG_EPSILON * (self._dr.exp(mapped) - 1.0)
@@ -207,12 +211,12 @@ class Objective:
                 return 0.0 * f_r + 1.0
 
     def _slope_at(self, mapped: Array) -> Array:
-        """The same, for a value that is mapped already."""
+        """The same, for a value that is already in the domain of the loss."""
         return self._slope(self._unmapped(mapped))
 
 
 def least_squares(gram: Matrix, data: Matrix, most: float | None) -> Matrix:
-    """x ≥ 0 (n, m) that minimises xᵀ gram x − 2 dataᵀ x column by column, Σ x ≤ `most` in each if that is given.
+    """The x ≥ 0, (n, m), that minimises xᵀ gram x − 2 dataᵀ x for each column, with Σ x ≤ `most` unless that is None.
 
     gram: AᵀA (n, n). data: Aᵀb (n, m).
     """
@@ -227,7 +231,7 @@ def least_squares(gram: Matrix, data: Matrix, most: float | None) -> Matrix:
     found = np.stack([nnls(root, column)[0] for column in right.T], axis=1) * scale[:, None]
     if most is not None:
         for channel in np.flatnonzero(found.sum(axis=0) > most):
-            # One more equation, Σ x = most, with a weight that lets it hold exactly, whatever the units are.
+            # One more equation, Σ x = most, with a weight that makes it hold exactly, whatever the units are.
             size = np.linalg.norm(right[:, channel]) * scale
             exact = np.vstack([root, HEAVY * size / size.max()])
             target = np.append(right[:, channel] / np.linalg.norm(right[:, channel]), HEAVY * most / size.max())

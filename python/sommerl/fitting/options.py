@@ -1,4 +1,4 @@
-"""What can be chosen about fits, and the defaults: those of the paper."""
+"""The options of fits. The defaults are those of the paper."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ MOST_STARTS = 1000
 class FitOptions:
     """What is minimised, over which directions, and how thoroughly.
 
-    lobes: of a model, its Lambertian base among them; None for the least: 2, or 1 of a model that is a base itself.
-    loss: the root of the mean square, over samples and channels, of differences of "l2": f_r; "cosine-l2": f_r cos θ_i
-        (Ngan et al. 2005, and with them the paper); "log": ln(1 + f_r cos θ_i / ε), ε = 0.001; "cube-root":
+    lobes: the number of lobes, the Lambertian base included. None: 2, or 1 for a model that is a base itself.
+    loss: the root mean square, over samples and channels, of the differences of one of: "l2", f_r; "cosine-l2",
+        f_r cos θ_i (Ngan et al. 2005, and the paper); "log", ln(1 + f_r cos θ_i / ε) with ε = 0.001; "cube-root",
         ∛(f_r cos θ_i).
-    sampling: "sphere", the directions that a rendered sphere sees, `samples` of them; "lattice", the centres of all
-        cells, MERL's if the material has none.
-    starts: how many places a search begins at; the first is the one of `Parameter.start`, all others are random.
+    sampling: "sphere", the directions that occur on a rendered sphere, `samples` of them; "lattice", the centres of all
+        cells of the material's lattice, or of MERL's if it has none.
+    starts: the number of starting points of the search. The first is from `Parameter.start`, the others are random.
     seed: of directions and starts.
-    conserve_energy: lets the albedos of a channel sum to 1 at most: what comes back is then no more than what comes in,
-        for families that promise as much (`Family.conserves_energy`).
+    conserve_energy: whether the albedos of a channel may add up to at most 1. No more light is then reflected than
+        arrives, for families that guarantee this of one lobe (`Family.conserves_energy`).
 
-    Raises OptionError for values outside these.
+    Raises OptionError for values that are not allowed.
     """
 
     lobes: int | None = None
@@ -59,7 +59,7 @@ class FitOptions:
 
 
 def family(model: str) -> Family:
-    """The family of that name. Raises OptionError, with all names, if there is none."""
+    """The family of a name. Raises OptionError, which lists all names, if there is none of that name."""
     if model not in FAMILIES:
         nearest = difflib.get_close_matches(model.lower(), FAMILIES, 1)
         hint = f"; did you mean {nearest[0]}?" if nearest else ""
@@ -68,20 +68,20 @@ def family(model: str) -> Family:
 
 
 def families_of(model: str, lobes: int | None, *, alone: bool = True) -> tuple[Family, ...]:
-    """The families of a model's lobes. Raises OptionError if it cannot have so many, or so few.
+    """The families of a model's lobes. Raises OptionError if the model cannot have that number of lobes.
 
-    alone: whether it is the only model asked for; if not, a number of lobes is not meant for those that have one.
+    alone: whether this is the only model asked for. If not, models that always have one lobe ignore `lobes`.
     """
     chosen = family(model)
     if chosen.diffuse:
         if alone and lobes not in (None, 1):
-            raise OptionError(f"lobes: expected 1 of {model}, which is a base itself, found {lobes}")
+            raise OptionError(f"lobes: {model} is a base itself and has 1 lobe, found {lobes}")
         return (chosen,)
     if lobes == 1:
-        raise OptionError(f"lobes: expected 2 to {MOST_LOBES} of {model}, its Lambertian base among them, found 1")
+        raise OptionError(f"lobes: expected 2 to {MOST_LOBES} of {model}, its Lambertian base included, found 1")
     return (LAMBERTIAN, *[chosen] * ((lobes or 2) - 1))
 
 
 def all_models(lobes: int | None) -> list[str]:
-    """All models that can have so many lobes, after those that are a base alone."""
+    """The names of all models that can have this number of lobes, and of those that always have one."""
     return [name for name, chosen in FAMILIES.items() if chosen.diffuse or lobes != 1]

@@ -1,8 +1,9 @@
 """The search for the shapes and albedos of a sum of lobes: sequential quadratic programming from many starts.
 
-After Ngan, Durand & Matusik 2005, "Experimental Analysis of BRDF Models", EGSR, and the paper: bounds on parameters, an
-albedo for each channel, shapes shared by the channels. Where the loss lets the best albedos for given shapes be
-solved for, only shapes are searched; docs/method.md compares.
+As in Ngan, Durand & Matusik 2005, "Experimental Analysis of BRDF Models", EGSR, and in the paper, parameters have
+bounds, and channels have their own albedos but share the shapes. If the loss is linear in f_r, the best albedos for
+given shapes are computed directly, and only the shapes are searched; docs/method.md compares this with searching for
+both.
 """
 
 from __future__ import annotations
@@ -23,20 +24,20 @@ from .options import FitOptions
 
 Vector = NDArray[np.float64]
 
-FEWER = 10  # all starts are searched from on every tenth sample,
-FEWEST = 20_000  # but on no fewer than these
-REFINED = 3  # so many of what they reach, if different, go on with all samples
-DIFFERENT = 0.02  # of the range of a parameter
-SHORT, LONG = 150, 300  # iterations: with albedos among the variables, 40 left starts half-way
-AGAIN = 4  # searches with all samples, each in units of what the last one left: SLSQP stops at an absolute change
-WORTHWHILE = 0.99
-EDGE = 0.02  # random starts keep that share of the range away from the bounds
-SMALLEST_STEP = 1e-3  # of the largest albedo, as a unit for an albedo near 0
+FEWER = 10  # the first search, from all starting points, uses one sample in ten,
+FEWEST = 20_000  # but no fewer than this
+REFINED = 3  # the number of best results, all different, that are refined with all samples
+DIFFERENT = 0.02  # results are different if a parameter differs by this share of its range
+SHORT, LONG = 150, 300  # most iterations of a search; 40 are too few if albedos are searched, too
+AGAIN = 4  # most searches with all samples, each scaled by the error before it, as SLSQP stops at an absolute change
+WORTHWHILE = 0.99  # … which end when one leaves more than this share of the error
+EDGE = 0.02  # share of a parameter's range, next to its bounds, in which no random start lies
+SMALLEST_STEP = 1e-3  # of the largest albedo: the unit in which smaller albedos are searched
 
 
 @dataclass(frozen=True)
 class End:
-    """Where a search came to: places of the shape parameters, albedos (lobes, 3), and the error over all samples."""
+    """The result of a search: where it started and ended (see `Parameter.place`), albedos (lobes, 3), and the error."""
 
     start: Vector
     places: Vector
@@ -45,7 +46,7 @@ class End:
 
 
 class Search:
-    """families: of the lobes."""
+    """A search for one model. families: of its lobes."""
 
     def __init__(self, families: Sequence[Family], samples: Samples, options: FitOptions) -> None:
         step = max(1, min(FEWER, len(samples.wi) // FEWEST))
@@ -53,12 +54,12 @@ class Search:
         self.part = (
             self.whole if step == 1 else Objective(families, samples.some(slice(None, None, step)), options.loss)
         )
-        self.solves = self.whole.linear  #: whether albedos are solved for, and not searched
+        self.solves = self.whole.linear  #: whether albedos are computed directly and not searched
         self._options = options
         self._most = 1.0 if options.conserve_energy else None
 
     def run(self, advance: Callable[[int], None]) -> tuple[End, list[End]]:
-        """The best end, and the ends of all starts on a part of the samples."""
+        """The best result, and the results from all starting points with a part of the samples."""
         ends: list[End] = []
         for start in self._starts():
             places, albedos = self._descend(self.part, start, None, SHORT)
@@ -73,7 +74,7 @@ class Search:
         return min([*refined, *ends], key=lambda end: end.error), ends
 
     def lobes(self, places: Vector, albedos: Matrix) -> list[Lobe]:
-        """As lobes of a material, the widest first."""
+        """Lobes with these shapes and albedos, the widest first."""
         found: list[Lobe] = []
         remaining = list(places)
         for family, albedo in zip(self.whole.families, albedos, strict=True):
@@ -107,7 +108,7 @@ class Search:
     def _descend(
         self, objective: Objective, places: Vector, albedos: Matrix | None, iterations: int
     ) -> tuple[Vector, Matrix]:
-        """From one place to the nearest minimum."""
+        """Searches for the nearest minimum from one starting point."""
         if self.solves:
             return self._descend_shapes(objective, places, iterations)
         if albedos is None:
@@ -115,7 +116,7 @@ class Search:
         return self._descend_all(objective, places, albedos, iterations)
 
     def _descend_shapes(self, objective: Objective, places: Vector, iterations: int) -> tuple[Vector, Matrix]:
-        """Over the shapes; the albedos follow."""
+        """Searches over the shapes; the albedos are the best for each."""
         unit = objective.solved(places, self._most)[1].distance or 1.0
 
         def value(x: Vector) -> tuple[float, Vector]:
@@ -129,7 +130,7 @@ class Search:
     def _descend_all(
         self, objective: Objective, places: Vector, albedos: Matrix, iterations: int
     ) -> tuple[Vector, Matrix]:
-        """Over shapes and albedos."""
+        """Searches over shapes and albedos."""
         count, shape = len(places), albedos.shape
         unit = objective.value(places, albedos).distance or 1.0
         size = np.maximum(albedos, SMALLEST_STEP * (albedos.max() or 1.0))
@@ -138,7 +139,7 @@ class Search:
             found = objective.value(x[:count], x[count:].reshape(shape) * size)
             return found.distance / unit, np.append(found.by_places, found.by_albedos * size) / unit
 
-        sums: list[Vector] = []  # of albedos, one a channel, none above 1
+        sums: list[Vector] = []  # for each channel, the sum of its albedos, which must not exceed 1
         for channel in range(3 if self._most else 0):
             row = np.zeros(shape)
             row[:, channel] = size[:, channel]
@@ -155,9 +156,9 @@ def _slsqp(
     iterations: int,
     sums: Sequence[Vector] = (),
 ) -> Vector:
-    """SciPy's SLSQP (Kraft 1988), to the end of its digits; of what it looked at, the best that is allowed.
+    """Minimises with SciPy's SLSQP (Kraft 1988) to full precision; returns the best allowed x that it evaluated.
 
-    value: what is minimised, and its derivative. sums: vectors whose products with x are 1 at most.
+    value: gives the function and its derivative. sums: vectors whose products with x must not exceed 1.
     """
     lowest, best = np.inf, start
 
@@ -185,7 +186,7 @@ def _slsqp(
 
 
 def _different(ends: Sequence[End]) -> list[End]:
-    """The REFINED best, of which no two are at one place."""
+    """The best results, at most REFINED of them, no two of which are the same (DIFFERENT)."""
     chosen: list[End] = []
     for end in sorted(ends, key=lambda end: end.error):
         if all(np.abs(end.places - other.places).max(initial=0) > DIFFERENT for other in chosen):

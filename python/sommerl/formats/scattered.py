@@ -19,7 +19,7 @@ from ..reflectance.half_diff import directions, half_diff
 from ..reflectance.samples import Samples
 from ..reflectance.table import BrdfTable
 from ..system.errors import FormatError, MaterialError
-from ..system.interrupt import undisturbed
+from ..system.interrupt import hold_interrupts
 from ..system.optional import optional
 from ..system.threads import limit
 
@@ -173,7 +173,7 @@ def _planes(
     tree: Any, known: NDArray[np.float64], domain: NDArray[np.float64], wanted: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """At each wanted point, the height of the plane fitted to its neighbours."""
-    with undisturbed():  # SciPy would leave its threads behind, at work on arrays that are gone
+    with hold_interrupts():  # SciPy would leave its threads behind, at work on arrays that are gone
         found: tuple[NDArray[np.float64], NDArray[np.intp]] = tree.query(wanted, NEIGHBOURS, workers=limit() or -1)
     distance, nearest = found
     reach = distance[:, -1:] * (1 + 1e-6) + 1e-12
@@ -191,7 +191,7 @@ def _near(samples: Samples, wi: Triple, wo: Triple) -> NDArray[np.bool_]:
     """Whether a sample lies within REACH of each pair, in half/difference angles."""
     known = _coordinates(split(samples.wi), split(samples.wo), root=False)
     tree, wanted = _tree(known), _coordinates(wi, wo, root=False)
-    with undisturbed():
+    with hold_interrupts():
         distance, _ = tree.query(wanted, distance_upper_bound=REACH, workers=limit() or -1)
     return np.isfinite(distance)
 

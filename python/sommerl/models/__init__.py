@@ -1,1 +1,1 @@
-"""BRDFs by formula, and the built-in ones."""
+"""Analytic BRDF models, and the built-in materials."""

@@ -1,8 +1,8 @@
 """Ashikhmin & Shirley 2000, "An Anisotropic Phong BRDF Model", Journal of Graphics Tools 5(2): the specular term, with
 one exponent for both directions of the surface.
 
-The paper couples a diffuse term to it, which takes what the specular one leaves; in fits a Lambertian stands in for
-that (Kurt & Cinsdikici 2008, after Ngan, Durand & Matusik 2005).
+Their diffuse term, which reflects what the specular one leaves, is replaced by a Lambertian lobe in fits (Kurt &
+Cinsdikici 2008, after Ngan, Durand & Matusik 2005).
 """
 
 from __future__ import annotations

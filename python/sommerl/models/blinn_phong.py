@@ -1,7 +1,7 @@
 """Blinn 1977, "Models of Light Reflection for Computer Synthesized Pictures", SIGGRAPH: a cosine power of θ_h.
 
-The factor makes the albedo 1 for wo along the normal, where it is largest; Giesen 2009, "Phong
-Normalization Factor derivation", derives it.
+The factor makes the albedo 1 for wo along the normal, where it is largest (derived in Giesen 2009, "Phong Normalization
+Factor derivation").
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""Built-in materials: stand-ins for ten measured ones, so that everything runs with no download.
+"""The built-in materials: stand-ins for ten measured ones, so that everything works without a download.
 
 Each is the Shifted Gamma fit of a material in the MERL database (parameters published with Bagher et al. 2012; see
-`models/sgd.py`). They are smooth approximations and not measurements, and are called SGD stand-ins wherever they
-appear.
+`models/sgd.py`). They are smooth approximations, not measurements, and are called SGD stand-ins everywhere.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ NAMES = (
 
 
 def builtin(name: str) -> ShiftedGamma:
-    """The formula of a built-in material. Raises MaterialError, with the nearest name, if there is none."""
+    """A built-in material, as a formula. Raises MaterialError, with the most similar name, for other names."""
     if name not in _FITS:
         nearest = difflib.get_close_matches(name, NAMES, 1, 0.0)[0]
         raise MaterialError(f"{name}: expected a file or a built-in material, found neither; did you mean {nearest}?")
@@ -39,18 +38,20 @@ def builtin(name: str) -> ShiftedGamma:
 
 
 def builtin_table(name: str, *, noise: int | None = None, lattice: Lattice = MERL) -> BrdfTable:
-    """A built-in material, evaluated at the cell centres of a lattice.
+    """A built-in material as a table: its formula at the cell centres of a lattice.
 
-    noise: seed of the measurement error that the paper quotes for MERL's data (deviations from reciprocity of 10-15 %
-        near normal incidence and 60-70 % at grazing angles), as a factor common to the channels, log-normal with
-        mean 1, σ = 0.12 + 0.5 (1 - cos θ)⁴ for the more grazing direction; None for none.
+    noise: None for no noise, or a seed. The noise has the size that the paper quotes for MERL's measurements
+    (deviations
+        from reciprocity of 10-15 % near normal incidence and 60-70 % at grazing angles). Each cell is multiplied by a
+        log-normal factor, the same for all channels, with mean 1 and σ = 0.12 + 0.5 (1 - cos θ)⁴, where θ is the larger
+        of θ_i and θ_o.
     """
     table = BrdfTable.sampled(builtin(name), lattice)
     if noise is None:
         return table
     cosine = np.clip(np.minimum(*lattice.cosines()), 0, 1)
     sigma = 0.12 + 0.5 * (1 - cosine) ** 4
-    # Box-Muller on the raw stream, which, unlike NumPy's own normal numbers, never changes.
+    # Box-Muller on the raw stream of the generator: NumPy's own normal numbers may change between versions.
     u = (np.random.PCG64(noise).random_raw(2 * lattice.size).reshape(2, *lattice.shape) + 0.5) / 2.0**64
     normal = np.sqrt(-2 * np.log(u[0])) * np.cos(2 * np.pi * u[1])
     factor = np.exp(sigma * normal - sigma**2 / 2)

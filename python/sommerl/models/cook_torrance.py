@@ -1,8 +1,8 @@
 """Cook & Torrance 1982, "A Reflectance Model for Computer Graphics", ACM Transactions on Graphics 1(1).
 
-With Schlick's approximation of F, as in the fits of Ngan, Durand & Matusik 2005, "Experimental Analysis of BRDF
-Models", EGSR, and with 4 in place of the printed π in the denominator, which is what the facets' density asks for
-(Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces", EGSR).
+Two things differ from the paper. F is Schlick's approximation, as in the fits of Ngan, Durand & Matusik 2005,
+"Experimental Analysis of BRDF Models", EGSR. The denominator has 4 where π is printed, which is correct for a
+normalised distribution of facets (Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces", EGSR).
 """
 
 from __future__ import annotations

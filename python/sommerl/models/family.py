@@ -1,4 +1,4 @@
-"""What every family of lobes is: a formula, its parameters, and where it sends the light."""
+"""What a family of lobes consists of: a formula, its parameters, and what importance sampling needs to know."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ PI = TWO_PI / 2
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number that shapes a lobe, the same for all channels.
+    """A number that determines the shape of a lobe, the same for all channels.
 
-    low, high: its bounds. start: where a search begins that knows nothing. scale: of the axis on which values are
-        evenly spread, for a search's steps and its random starts.
+    low, high: its bounds. start: the value at which a search begins if nothing is known about the material. scale:
+        whether a search's steps and random starts are uniform in the value or in its logarithm.
     """
 
     name: str
@@ -29,13 +29,13 @@ class Parameter:
     scale: Literal["linear", "logarithmic"] = "linear"
 
     def at(self, place: Array) -> Array:
-        """The value at a place in [0, 1] between the bounds; an array of places gives one of values."""
+        """The value at a place in [0, 1], where 0 and 1 are the bounds; also for arrays of places."""
         if self.scale == "linear":
             return self.low + (self.high - self.low) * place
         return self.low * ops(place).exp(math.log(self.high / self.low) * place)
 
     def place(self, value: float) -> float:
-        """The place, in [0, 1], of a value between the bounds."""
+        """The place in [0, 1] of a value: the inverse of `at`."""
         if self.scale == "linear":
             return (value - self.low) / (self.high - self.low)
         return math.log(value / self.low) / math.log(self.high / self.low)
@@ -45,13 +45,13 @@ class Parameter:
 class Family:
     """A family of lobes.
 
-    source: who published it, where.
-    lobe: f_r [1/sr] for an albedo of one, which is a factor (with a Fresnel term, less comes back), from Angles and one
-        number a parameter, on NumPy and on Dr.Jit arrays.
-    reciprocal: whether it promises the same for wi and wo swapped. conserves_energy: whether it promises to reflect no
-        more than its albedo's share of the light, from wherever it comes.
-    exponent: for importance sampling, the exponent of Blinn-Phong's lobe whose half vectors are about as wide, from the
-        same parameters; None if the lobe is diffuse, and directions are best drawn by the cosine.
+    source: the publication.
+    lobe: a function of Angles and of one number for each parameter that gives f_r [1/sr] for the albedo 1, on NumPy and
+        on Dr.Jit arrays. f_r is proportional to the albedo; with a Fresnel term, less than the albedo is reflected.
+    conserves_energy: whether a lobe never reflects more than its albedo's share of the light, from any direction.
+    exponent: for importance sampling, a function of the parameters that gives the exponent of the Blinn-Phong lobe
+        whose half vectors are about as widely spread; None for a diffuse lobe, for which directions follow the cosine.
+    reciprocal: whether f_r is the same for wi and wo swapped.
     """
 
     name: str
@@ -69,7 +69,7 @@ class Family:
 
 @dataclass(frozen=True)
 class Angles:
-    """What formulas ask about pairs of directions above the horizon; what none asks for is not calculated.
+    """Angles of pairs of directions above the horizon, as formulas need them. Each is computed when it is first used.
 
     wi, wo: components (x, y, z) of unit vectors, z along the normal.
     """
@@ -102,7 +102,9 @@ class Angles:
     @cached_property
     def cos_h(self) -> Array:
         f = ops(self.theta_h)
-        return f.maximum(f.cos(self.theta_h), 1e-7)  # in single precision, π/2 is more than it should be
+        return f.maximum(
+            f.cos(self.theta_h), 1e-7
+        )  # in single precision, π/2 is rounded up, and its cosine is negative
 
     @cached_property
     def sin_h(self) -> Array:
@@ -110,7 +112,7 @@ class Angles:
 
     @cached_property
     def tan2_h(self) -> Array:
-        """tan² θ_h, which keeps the digits near the highlight that 1 − cos² θ_h loses."""
+        """tan² θ_h, precise near the highlight, where 1 − cos² θ_h would lose digits."""
         tangent = self.sin_h / self.cos_h
         return tangent * tangent
 
@@ -126,7 +128,7 @@ def exponent_of_width(width: float, *_: float) -> float:
 
 
 def cosine_power(cosine: Array, exponent: Array) -> Array:
-    """cosine^exponent; where the cosine is not positive, as good as 0, with a derivative that is a number."""
+    """cosine^exponent. Where the cosine is not positive, it is nearly 0, and its derivative is finite."""
     f = ops(cosine)
-    # Not `power`: Dr.Jit's, in double precision, gives infinities for some results near the smallest numbers.
+    # Not `power`: in double precision, Dr.Jit's gives infinity for some results that are close to 0.
     return f.exp(exponent * f.log(f.maximum(cosine, 1e-6)))

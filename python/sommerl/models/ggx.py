@@ -1,4 +1,4 @@
-"""A rough surface of GGX microfacets: what renderers' own materials are made of.
+"""A rough surface of GGX microfacets, the model that most renderers use.
 
 D: Walter, Marschner, Li & Torrance 2007, "Microfacet Models for Refraction through Rough Surfaces", EGSR, Eq. 33.
 G: Heitz 2014, "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", JCGT 3(2), Eq. 72 and 99.
@@ -13,7 +13,7 @@ from .microfacets import F0, fresnel
 
 def distribution(a: Angles, alpha: Array) -> Array:
     """D [1/sr], the density of the microfacets' normals: ∫ D cos θ_h dω_h = 1."""
-    # No 1 - cos²: it would lose the digits that matter in the highlight.
+    # Not 1 - cos², which would lose precision in the highlight.
     cosine = alpha * a.cos_h
     width = cosine * cosine + a.sin_h * a.sin_h
     return (alpha * alpha / PI) / (width * width)

@@ -1,8 +1,8 @@
 """Lafortune, Foo, Torrance & Greenberg 1997, "Non-Linear Approximation of Reflectance Functions", SIGGRAPH, Eq. 6.
 
-The isotropic lobe [C_xy (x_i x_o + y_i y_o) + C_z z_i z_o]ⁿ has one number too many for a lobe with an albedo: a factor
-common to C_xy and C_z is one of the albedo. Here C_z = 1, and the larger of |C_xy| and 1 is divided out. C_xy = −1 is
-Phong's lobe; below −1 the lobe leans to grazing angles, and above 0 it sends light back to where it came from.
+The isotropic lobe is [C_xy (x_i x_o + y_i y_o) + C_z z_i z_o]ⁿ. A factor common to C_xy and C_z only changes the
+albedo, so C_z = 1 here, and the lobe is divided by the larger of |C_xy| and 1. C_xy = −1 is Phong's lobe; below −1, the
+lobe is shifted towards grazing angles; above 0, it is retroreflective.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def lobe(a: Angles, c_xy: Array, n: Array) -> Array:
 
 
 def exponent(c_xy: float, n: float) -> float:
-    """As Phong's; a lobe that lies elsewhere is drawn from less well."""
+    """As for Phong's lobe. For C_xy far from −1, sampling is less efficient."""
     return 4.0 * n
 
 

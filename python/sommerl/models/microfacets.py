@@ -1,12 +1,12 @@
-"""What models of microfacets share. f_r = D F G / (4 cos θ_i cos θ_o), with ∫ D cos θ_h dω_h = 1."""
+"""What microfacet models share: f_r = D F G / (4 cos θ_i cos θ_o), with ∫ D cos θ_h dω_h = 1."""
 
 from __future__ import annotations
 
 from ..reflectance.arrays import Array, ops
 from .family import Angles, Parameter
 
-SLOPE = Parameter("m", 0.004, 1.0, 0.15, "logarithmic")  # of the facets: root of the mean square
-F0 = Parameter("f0", 0.0, 1.0, 0.1)  # the reflectance of a facet that is looked at along its normal
+SLOPE = Parameter("m", 0.004, 1.0, 0.15, "logarithmic")  # the root mean square slope of the facets
+F0 = Parameter("f0", 0.0, 1.0, 0.1)  # the reflectance of a facet at normal incidence
 
 
 def fresnel(cos_d: Array, f0: Array) -> Array:

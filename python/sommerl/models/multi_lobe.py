@@ -1,4 +1,4 @@
-"""A sum of lobes with an albedo for each channel: analytic models as they are fitted and compared.
+"""Analytic models: sums of lobes, each with an albedo for each channel.
 
 Ngan, Durand & Matusik 2005, "Experimental Analysis of BRDF Models", EGSR: a Lambertian base under one or more specular
 lobes; albedos differ between channels, shapes do not.
@@ -53,8 +53,8 @@ LARGEST_ALBEDO = 1e30  # renderers calculate in single precision
 class Lobe:
     """One lobe: a family's formula times an albedo (r, g, b).
 
-    shape: a number for each of the family's parameters. Raises MaterialError for other names, and for numbers that are
-    negative albedos, out of the parameter's bounds or not finite.
+    shape: a number for each of the family's parameters, by name. Raises MaterialError for missing or unknown names, for
+    parameters out of their bounds, and for albedos that are negative, too large or not finite.
     """
 
     family: Family
@@ -80,17 +80,17 @@ class Lobe:
 
     @property
     def exponent(self) -> float:
-        """How narrow it is: of Blinn-Phong's lobe with half vectors as narrow; 0 of a diffuse lobe."""
+        """How narrow the lobe is: the exponent of a Blinn-Phong lobe of about the same width; 0 for a diffuse lobe."""
         return self.family.exponent(*self.values) if self.family.exponent else 0.0
 
     @property
     def values(self) -> tuple[float, ...]:
-        """The shape, in the order of the family's parameters."""
+        """The numbers of the shape, in the order of the family's parameters."""
         return tuple(self.shape[p.name] for p in self.family.parameters)
 
 
 class MultiLobe(Brdf):
-    """f_r = Σ albedo · lobe. Raises MaterialError if there is no lobe."""
+    """The BRDF f_r = Σ albedo · lobe. Raises MaterialError if there is no lobe."""
 
     def __init__(self, name: str, lobes: Sequence[Lobe]) -> None:
         if not lobes:
@@ -99,7 +99,7 @@ class MultiLobe(Brdf):
         self.lobes = tuple(lobes)
 
     def buffers(self) -> dict[str, NDArray[Any]]:
-        # In a buffer, and not in the formula, so that materials of the same families share one compiled kernel.
+        # In a buffer and not in the formula, so that materials with the same families share one compiled kernel.
         return {"parameters": np.array([x for lobe in self.lobes for x in (*lobe.albedo, *lobe.values)])}
 
     def details(self) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from ..system.errors import MaterialError
 
 SHAPES = ((6, 21), (21, 21), (21, 3))
 WEIGHTS = sum((rows + 1) * columns for rows, columns in SHAPES)
-LARGEST_WEIGHT = 1e10  # three layers of them stay within single precision
+LARGEST_WEIGHT = 1e10  # so that results of three layers stay within single precision
 LARGEST_EXPONENT = 20.0  # of the output: f_r up to 5e8
 
 
@@ -23,14 +23,15 @@ class NeuralBrdf(Brdf):
     """f_r = max(0, exp(W₃ relu(W₂ relu(W₁ x + b₁) + b₂) + b₃) − 1), x = (half vector, difference vector), in the frame
     in which the half vector's azimuth is 0.
 
-    layers: three pairs of a matrix, of SHAPES (inputs, outputs), and a bias (outputs). Raises MaterialError for others.
+    layers: three pairs of a matrix (inputs, outputs), with SHAPES, and a bias (outputs). Raises MaterialError for other
+    shapes, and for weights that are too large or not finite.
     """
 
     def __init__(self, layers: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]], *, name: str) -> None:
         found = [(weights.shape, bias.shape) for weights, bias in layers]
         if found != [(shape, shape[1:]) for shape in SHAPES]:
             raise MaterialError(f"{name}: expected layers of shapes {SHAPES} with biases, found {found}")
-        if not all((np.abs(values) <= LARGEST_WEIGHT).all() for layer in layers for values in layer):  # nor is NaN
+        if not all((np.abs(values) <= LARGEST_WEIGHT).all() for layer in layers for values in layer):  # False for NaN
             raise MaterialError(f"{name}: expected finite weights of at most {LARGEST_WEIGHT:g}, found others")
         self.name = name
         self._layers = layers

@@ -1,7 +1,7 @@
 """Oren & Nayar 1994, "Generalization of Lambert's Reflectance Model", SIGGRAPH: a surface of rough diffuse facets.
 
-This is the paper's approximation, its "qualitative model" (Eq. 30), without interreflections. For σ below 0.326 it
-reflects more than comes in at grazing angles, by 1.5 % at the most.
+This is the approximation that they call "qualitative model" (Eq. 30), without interreflections. For σ below 0.326, it
+reflects more light than arrives at grazing angles, by at most 1.5 %.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from .family import PI, Angles, Family, Parameter
 def lobe(a: Angles, sigma: Array) -> Array:
     """f_r [1/sr] = (A + B max(0, cos Δφ) sin α tan β) / π, α the larger of θ_i and θ_o, β the smaller.
 
-    sigma: standard deviation of the facets' slopes [rad].
+    sigma: standard deviation of the facets' slope angles [rad].
     """
     f = ops(a.cos_i)
     sigma2 = sigma * sigma

@@ -1,7 +1,7 @@
-"""Phong's lobe about the mirror direction, in the form that is reciprocal and keeps energy.
+"""Phong's lobe about the mirror direction, in the form that is reciprocal and conserves energy.
 
-Phong 1975, "Illumination for Computer Generated Pictures", Communications of the ACM 18(6), gives reflected light, and
-not a BRDF. Made one by dividing by cos θ_i, it would be neither reciprocal nor bounded; Lafortune & Willems 1994,
+Phong 1975, "Illumination for Computer Generated Pictures", Communications of the ACM 18(6), gives the reflected light,
+not a BRDF. Divided by cos θ_i, it would be a BRDF that is neither reciprocal nor bounded. Lafortune & Willems 1994,
 "Using the Modified Phong Reflectance Model for Physically Based Rendering", KU Leuven CW 197, Eq. 3, leave the cosine
 out and normalise the lobe.
 """

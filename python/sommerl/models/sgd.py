@@ -18,7 +18,7 @@ PARAMETERS = ("rho_d", "rho_s", "alpha", "p", "f0", "f1", "kappa", "lambda", "c"
 
 
 class ShiftedGamma(Brdf):
-    """f_r = (ρ_d + ρ_s D F G / (cos θ_i cos θ_o)) / π, with parameters of its own for each channel.
+    """f_r = (ρ_d + ρ_s D F G / (cos θ_i cos θ_o)) / π, with separate parameters for each channel.
 
     parameters: three numbers (r, g, b) for each name in PARAMETERS.
     """
@@ -35,7 +35,7 @@ class ShiftedGamma(Brdf):
 
 @dataclass(frozen=True)
 class Angles:
-    """What the formula knows of a pair of directions."""
+    """The angles of a pair of directions that the formula needs. cosines: cos θ_i cos θ_o."""
 
     cos_h: Array
     cos_d: Array
@@ -56,7 +56,7 @@ def channel(q: Mapping[str, float], seen: Angles) -> Array:
     f = ops(seen.cos_h)
 
     def shadowing(theta: Array) -> Array:
-        # c (θ - θ0)^k with c inside of the power, since published values of c reach 1e66.
+        # c (θ - θ0)^k with c inside the power, since the published values of c go up to 1e66.
         beyond = f.power(q["c"] ** (1.0 / q["k"]) * f.maximum(theta - q["theta0"], 0.0), q["k"])
         return f.minimum(f.maximum(1.0 + q["lambda"] * (1.0 - f.exp(f.minimum(beyond, 80.0))), 0.0), 1.0)
 

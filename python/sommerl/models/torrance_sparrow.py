@@ -1,8 +1,8 @@
 """Torrance & Sparrow 1967, "Theory for Off-Specular Reflection from Roughened Surfaces", JOSA 57(9).
 
 The facets' angles to the normal have a Gaussian distribution. Blinn 1977 brought the model to graphics. F is Schlick's
-approximation. The factor 1 / (π m²) is exact for small m; for larger ones the facets cover less than the surface
-(0.94 of it for m = 0.3, 0.85 for 0.5, 0.55 for 1).
+approximation. The factor 1 / (π m²) normalises D only for small m. For larger ones ∫ D cos θ_h dω_h is less than 1:
+0.94 for m = 0.3, 0.85 for 0.5, 0.55 for 1.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Ward 1992, "Measuring and Modeling Anisotropic Reflection", SIGGRAPH: a Gaussian of tan θ_h. The isotropic form.
 
-It darkens towards grazing angles, but just above the horizon grows without bound, as 1 / √cos θ_o: for α = 0.5, it
-reflects more than comes in from 89.8° on; for narrower lobes, from still closer to the horizon.
+Its albedo falls towards grazing angles, but just above the horizon it grows without bound, as 1 / √cos θ_o. For α =
+0.5, it reflects more light than arrives beyond 89.8°; for narrower lobes, only still closer to the horizon.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Pictures of data, with matplotlib.
+"""Pictures of materials and of data about them, drawn with matplotlib.
 
-One function a picture. Those of a BRDF draw into axes that they are given, `f(ax, brdf, ...)`, so that they go into
-figures of your own; `sheet` puts several on one page, and `save` writes it.
+There is one function for each kind of picture. Those that show a BRDF draw into matplotlib axes that they are given,
+`f(ax, brdf, ...)`, so they can be part of your own figures. `sheet` puts several on one page, and `save` writes it.
 """
 
 from .curves import lobes, theta_h_slices

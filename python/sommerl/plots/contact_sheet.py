@@ -1,4 +1,4 @@
-"""Pictures in rows, with captions."""
+"""Arranges pictures of one size in rows, with captions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .style import plain_style
 
 
 def tiled(pictures: Sequence[NDArray[Any]], columns: int) -> NDArray[Any]:
-    """Pictures of one size in rows, black where the last row ends early."""
+    """One picture of several of the same size in rows; black where the last row is not full."""
     rows = -(-len(pictures) // columns)
     height, width, *rest = pictures[0].shape
     sheet = np.zeros((rows, height, columns, width, *rest), pictures[0].dtype)
@@ -26,8 +26,9 @@ def tiled(pictures: Sequence[NDArray[Any]], columns: int) -> NDArray[Any]:
 def captioned(
     pictures: Sequence[tuple[str, NDArray[np.uint8]]], columns: int, notes: Sequence[str] = ()
 ) -> NDArray[np.uint8]:
-    """Pictures of one size in rows, pixel for pixel, on white, each with a caption below, and notes below all.
+    """One picture, on white, of several of the same size in rows, not resampled.
 
+    pictures: captions, which are set below the pictures, and 8-bit pixels (height, width, 3). notes: text below all.
     Raises MissingDependencyError without matplotlib.
     """
     height, width = pictures[0][1].shape[:2]
@@ -47,11 +48,11 @@ def captioned(
         )
     for number, line in enumerate(lines):
         words.append((wide / 2, rows * step + (number + 0.5) * band, line, wide))
-    return np.minimum(_lettered(sheet.shape[:2], words, text), sheet)  # letters are darker than what they stand on
+    return np.minimum(_lettered(sheet.shape[:2], words, text), sheet)  # text is darker than its background
 
 
 def _lines(notes: Sequence[str], most: int) -> list[str]:
-    """Notes in lines of at most so many letters; one that is longer has its own."""
+    """Notes, several in a line of at most `most` characters. A longer note has a line of its own."""
     lines: list[str] = []
     for note in notes:
         together = f"{lines[-1]}    {note}" if lines else note
@@ -63,7 +64,7 @@ def _lines(notes: Sequence[str], most: int) -> list[str]:
 
 
 def _lettered(shape: tuple[int, ...], words: Sequence[tuple[float, float, str, int]], height: int) -> NDArray[np.uint8]:
-    """Words on white: where their middle is, what they are, and how many pixels they may take."""
+    """Texts on white. words: for each the x and y of its middle [pixels], the text, and its greatest width [pixels]."""
     figures = optional("matplotlib.figure", "matplotlib", "labels", "render")
     agg = optional("matplotlib.backends.backend_agg", "matplotlib", "labels", "render")
     size = 0.72 * height  # of the font
@@ -71,7 +72,7 @@ def _lettered(shape: tuple[int, ...], words: Sequence[tuple[float, float, str, i
         figure = figures.Figure(figsize=((shape[1] + 0.5) / 100, (shape[0] + 0.5) / 100), dpi=100)
         canvas = agg.FigureCanvasAgg(figure)
         for x, y, word, room in words:
-            # No mathematics: a dollar or an underscore in a name is one.
+            # Formulas are off, so that a dollar sign or an underscore in a name is shown as it is.
             place = x / shape[1], 1 - y / shape[0]
             drawn = figure.text(*place, word, fontsize=size, ha="center", va="center", parse_math=False)
             taken = drawn.get_window_extent(canvas.get_renderer()).width
@@ -82,7 +83,7 @@ def _lettered(shape: tuple[int, ...], words: Sequence[tuple[float, float, str, i
 
 
 def shortened(text: str, most: int) -> str:
-    """A text of at most so many letters, its middle left out."""
+    """A text of at most `most` characters; of a longer one, the middle is replaced by "…"."""
     if len(text) <= most:
         return text
     keep = max(most - 1, 2)

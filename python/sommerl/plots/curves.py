@@ -1,4 +1,4 @@
-"""f_r as curves: lobes in the plane of incidence, and slices along θ_h."""
+"""Draws f_r as curves: lobes in the plane of incidence, and slices along θ_h."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from .page import STYLES, THETA_H_TICKS, Materials, colours, legend, matplotlib,
 
 INCIDENCES = tuple(np.radians((0, 30, 60, 80)).tolist())
 DIFFERENCES = tuple(np.radians((0, 30, 60, 75)).tolist())
-STEPS = 720
-DARKEST = 10  # percentile of a curve's values that sets the scale
-DEEPEST = 1e-9  # of the peak: what it may be
+STEPS = 720  # of a curve
+DARKEST = 10  # percentile of the values that is the lower end of the logarithmic scale
+DEEPEST = 1e-9  # … but that end is at least this share of the peak
 
 
 def lobes(ax: Any, brdf: Materials, theta_i: Sequence[float] = INCIDENCES) -> None:
     """Draws polar lobes: f_r in the plane of incidence over θ_o, a curve for each incident elevation and material.
 
-    ax: polar axes; lines hold θ_o [rad] and f_r [1/sr], the mean of the channels. brdf: one, or up to five by name,
-    each with its own kind of line. theta_i: [rad], in [0, π/2).
+    ax: polar axes; the lines' data are θ_o [rad] and f_r [1/sr], the mean of the channels. brdf: one, or up to five by
+    name, each of which has its own line style. theta_i: [rad], in [0, π/2).
 
-    Light comes from the left (arrows); θ_o is positive to the right, where a dotted ray marks the mirror direction. The
-    radius is logarithmic, or the diffuse base of a glossy material could not be seen; what lies below its origin is
-    drawn there. Raises ValueError for other axes or angles, MaterialError for a black material.
+    Light comes from the left (arrows). θ_o is positive to the right, where a dotted ray marks the mirror direction. The
+    radius is logarithmic, since otherwise the diffuse part of a glossy material could not be seen; values below its
+    lower end are drawn at the centre. Raises ValueError for other axes or angles, MaterialError for a black material.
     """
     if ax.name != "polar":
         raise ValueError(f"lobes: expected polar axes, found {ax.name}")
@@ -37,7 +37,9 @@ def lobes(ax: Any, brdf: Materials, theta_i: Sequence[float] = INCIDENCES) -> No
     materials = named(brdf)
     curves = [[_lobe(one, angle) for angle in angles] for _, one in materials]
     low, peak = _extremes(np.concatenate([f_r for curve in curves for _, f_r in curve]))
-    floor = low / max((peak / low) ** (1 / 3), 10.0)  # the darkest are a quarter of the radius, at least a decade
+    floor = low / max(
+        (peak / low) ** (1 / 3), 10.0
+    )  # the darkest values lie at a quarter of the radius, or a decade above the centre
     top = peak * (peak / floor) ** 0.06
     ax.set_theta_zero_location("N")
     ax.set_theta_direction(-1)
@@ -49,7 +51,7 @@ def lobes(ax: Any, brdf: Materials, theta_i: Sequence[float] = INCIDENCES) -> No
         ax.plot([angle, angle], [floor, top], ":", color=colour, linewidth=0.8)
         _arrow(ax, -angle, floor, top, colour)
     ax.set(thetamin=-90, thetamax=90)
-    ax.set_title("$f_r$ [1/sr] in the plane of incidence", y=0.88)  # half a disc is the middle half of its axes
+    ax.set_title("$f_r$ [1/sr] in the plane of incidence", y=0.88)  # a half disc fills only the middle half of its axes
     ax.set_rlim(floor, top)
     ax.set_thetagrids(range(-90, 91, 30))
     _decades(ax, floor, top)
@@ -64,11 +66,12 @@ def lobes(ax: Any, brdf: Materials, theta_i: Sequence[float] = INCIDENCES) -> No
 
 
 def theta_h_slices(ax: Any, brdf: Materials, theta_d: Sequence[float] = DIFFERENCES, phi_d: float = HALF_PI) -> None:
-    """Draws f_r over θ_h, a curve for each θ_d and material: the highlight's shape, and how it grows towards grazing.
+    """Draws f_r over θ_h, a curve for each θ_d and material. It shows the shape of the highlight, and how it grows
+    towards grazing angles.
 
-    Lines hold θ_h in degrees, on an axis of √θ_h, the spacing of MERL's tables, and f_r [1/sr], the mean of the
-    channels, on a logarithmic one; NaN below the horizon. brdf: one, or up to five by name, each with its own kind of
-    line. theta_d: [rad], in [0, π/2). phi_d: [rad]; at π/2, both directions are equally high.
+    The lines' data are θ_h [degrees], on an axis that is linear in √θ_h as MERL's tables are, and f_r [1/sr], the mean
+    of the channels, on a logarithmic axis; f_r is NaN below the horizon. brdf: one, or up to five by name, each of
+    which has its own line style. theta_d: [rad], in [0, π/2). phi_d: [rad]; at π/2, θ_i and θ_o are equal.
 
     Raises ValueError for angles out of range, MaterialError for a black material.
     """
@@ -95,7 +98,7 @@ def theta_h_slices(ax: Any, brdf: Materials, theta_d: Sequence[float] = DIFFEREN
 
 
 def _beside(materials: int) -> dict[str, Any]:
-    """Where a legend goes: with the names of several materials it would hide curves, and goes below them."""
+    """Where the legend goes: below the curves if it names several materials, since it would hide them."""
     return (
         {"loc": "upper right"}
         if materials == 1
@@ -104,6 +107,7 @@ def _beside(materials: int) -> dict[str, Any]:
 
 
 def _checked(name: str, angles: Sequence[float]) -> list[float]:
+    """The angles. Raises ValueError if there are none, or any outside [0, π/2)."""
     found = [float(angle) for angle in angles]
     if not found or not all(0 <= angle < HALF_PI for angle in found):
         raise ValueError(f"{name}: expected angles from 0 to less than π/2, found {found}")
@@ -111,7 +115,7 @@ def _checked(name: str, angles: Sequence[float]) -> list[float]:
 
 
 def _lobe(brdf: Brdf, theta_i: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """θ_o and f_r. A highlight may be a hundredth of a degree wide: steps are small about the mirror direction."""
+    """θ_o and f_r of a lobe. Steps are small near the mirror direction: a highlight may be only 0.01° wide."""
     near = np.geomspace(1e-5, 0.2, 60)
     steps = np.linspace(-HALF_PI, HALF_PI, STEPS + 1)
     theta_o = np.unique(np.concatenate([steps, theta_i - near, [theta_i], theta_i + near]))
@@ -121,16 +125,16 @@ def _lobe(brdf: Brdf, theta_i: float) -> tuple[NDArray[np.float64], NDArray[np.f
 
 
 def _extremes(f_r: NDArray[np.float64]) -> tuple[float, float]:
-    """The darkest values, but for a few, and the peak: what a logarithmic axis has to show."""
+    """The range that a logarithmic axis has to show: the DARKEST percentile of the values, and the largest one."""
     shown = f_r[(f_r > 0) & np.isfinite(f_r)]
     if not shown.size:
-        raise MaterialError("picture: expected a material that reflects light, found a black one")
+        raise MaterialError("picture: the material is black, so there is nothing to draw")
     peak = float(shown.max())
     return max(float(np.percentile(shown, DARKEST)), DEEPEST * peak), peak
 
 
 def _arrow(ax: Any, theta: float, floor: float, top: float, colour: Any) -> None:
-    """Light that comes in: from the rim, an eighth of the way to the middle."""
+    """An arrow from the rim inwards, over an eighth of the radius: light that comes in at `theta`."""
     end = top * (floor / top) ** 0.13
     ax.annotate(
         "",
@@ -142,7 +146,7 @@ def _arrow(ax: Any, theta: float, floor: float, top: float, colour: Any) -> None
 
 
 def _decades(ax: Any, floor: float, top: float) -> None:
-    """Circles at powers of ten, four at most, or their labels meet."""
+    """Circles at powers of ten, at most four, so that their labels do not overlap."""
     first, last = int(np.ceil(np.log10(floor))), int(np.floor(np.log10(top)))
     step = -(-(last - first + 1) // 4)
     ticks = list(range(first, last + 1, max(step, 1)))

@@ -1,4 +1,4 @@
-"""The slice θ_h × θ_d as an image."""
+"""Draws a slice of f_r over θ_h and θ_d as an image."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from ..reflectance.half_diff import directions
 from .page import THETA_H_TICKS, number
 from .tone import Tone
 
-SIDE = 180  # pixels, two for each of MERL's bins
+SIDE = 180  # pixels: two for each bin of MERL's tables
 
 
 def slices(ax: Any, brdf: Brdf, phi_d: float = HALF_PI, tone: Tone | None = None) -> Tone:
     """Draws f_r over θ_h and θ_d at one φ_d as a colour image: the image slice of Disney's BRDF Explorer (Burley 2012,
     "Physically-based shading at Disney").
 
-    The highlight is on the left, Fresnel's rise at the top, retroreflection at the bottom. θ_h is spaced as in MERL's
-    tables, equally in √θ_h (in the Explorer, an option), or a sharp highlight would be less than a pixel. phi_d: [rad].
-    tone: from f_r to colours; if not given, one for this image. Returns it, so that the next image can be shown alike.
+    The highlight is on the left, the rise due to Fresnel reflection at the top, retroreflection at the bottom. The axis
+    is linear in √θ_h, as MERL's tables are, since a sharp highlight would be narrower than a pixel in θ_h. phi_d:
+    [rad]. tone: the curve from f_r to colours; if not given, one that fits this image. Returns the curve, so that other
+    images can be drawn with the same one.
 
-    The image is of shape (180, 180, 4), RGBA in 8 bits, of f_r at the pixels' centres, and transparent below the
-    horizon; its coordinates are √(θ_h / 90°) in [0, 1] and θ_d in degrees.
+    The image has shape (180, 180, 4): RGBA in 8 bits, of f_r at the pixels' centres, transparent below the horizon. Its
+    coordinates are √(θ_h / 90°) in [0, 1] and θ_d in degrees.
     """
     place = (np.arange(SIDE) + 0.5) / SIDE
     wi, wo = directions(*np.broadcast_arrays(place**2 * HALF_PI, place[:, None] * HALF_PI, phi_d))

@@ -1,4 +1,4 @@
-"""How often each cell of a lattice is hit by directions in natural coordinates (Kurt & Cinsdikici 2008, Fig. 2)."""
+"""Counts how often directions at equal steps of θ and φ hit each cell of a lattice: the paper's Fig. 2."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from ..reflectance.cells import HALF_PI, Lattice
 from ..reflectance.half_diff import TWO_PI, half_diff, spherical
 from ..system.errors import MaterialError
 
-THETA_STEPS, PHI_STEPS = 90, 180  # of each direction: 1° and 2°
+THETA_STEPS, PHI_STEPS = 90, 180  # of each direction: steps of 1° and of 2°
 
 
 def hit_counts(lattice: Lattice) -> NDArray[np.int64]:
     """How many of the paper's 90 × 180 × 90 × 180 pairs (θ_i, φ_i, θ_o, φ_o) fall into each cell.
 
-    Of the lattice's shape; they add up to 262,440,000. The paper does not say where in its steps of 1° in θ and 2° in φ
-    directions lie; here in the middle, as at θ = 0 all φ are the same direction. A lattice of isotropic materials knows
-    φ_o − φ_i alone, of which each value occurs 180 times: one φ_i stands for all.
+    Returns counts of the lattice's shape, which add up to 262,440,000. The paper does not say where in its steps of 1°
+    in θ and 2° in φ the directions lie. Here θ is in the middle of its step, since at θ = 0 all φ are the same
+    direction. For isotropic materials only φ_o − φ_i matters, and each value of it occurs 180 times, so one φ_i is
+    counted 180 times.
     """
     theta = (np.arange(THETA_STEPS) + 0.5) * (HALF_PI / THETA_STEPS)
     phi = np.arange(PHI_STEPS) * (TWO_PI / PHI_STEPS)
@@ -34,15 +35,16 @@ def hit_counts(lattice: Lattice) -> NDArray[np.int64]:
 
 
 def hits(ax: Any, material: Brdf) -> None:
-    """Draws the paper's Fig. 2: how often cells are hit if directions are taken in natural coordinates, over the number
-    of the cell. Many are never hit, which is why the paper compresses.
+    """Draws the paper's Fig. 2 (Kurt & Cinsdikici 2008): over the number of the cell, how often cells are hit by
+    directions at equal steps of θ and φ. Many are never hit, which is one reason to compress.
 
-    It depends on the lattice, not on the material. A bar is a row of cells of equal θ_h and θ_d (180 in φ_d, in MERL's
-    lattice); the bars add up to all pairs. See `hit_counts`. Raises MaterialError for a material without cells.
+    It depends on the lattice, not on the material. Each bar counts the hits of all cells of equal θ_h and θ_d (in
+    MERL's lattice 180, in φ_d); the bars add up to all pairs. See `hit_counts`. Raises MaterialError for a material
+    that is not on a lattice of cells.
     """
     lattice = material.grid
     if lattice is None:
-        raise MaterialError(f"{material.name}: expected a material on a lattice of cells, found one without")
+        raise MaterialError(f"{material.name}: hits are drawn only of materials on a lattice of cells, which it is not")
     counts = hit_counts(lattice)
     rows = counts.sum(axis=2).reshape(-1)
     ax.stairs(rows, np.arange(len(rows) + 1) * lattice.phi_d, fill=True, color="C0")

@@ -1,4 +1,4 @@
-"""What pictures share: names, colours, the √θ_h axis, and how a figure is written."""
+"""What all pictures share: names, colours, line styles, the ticks of the √θ_h axis, and the writing of figures."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from ..system.optional import optional
 from ..system.visible import visible
 from .style import plain_style
 
-Material = tuple[str, Brdf]  #: and its name
-Materials = Brdf | Mapping[str, Brdf]  #: a material, or several by the names that a legend gives them
+Material = tuple[str, Brdf]  #: a name, and the material
+Materials = Brdf | Mapping[str, Brdf]  #: one material, or several by the names that the legend shows
 
 DPI = 110
 LONGEST_NAME = 60
 THETA_H_TICKS = (0, 1, 5, 15, 30, 50, 90)  # degrees, on an axis of √θ_h
-# Extensions, and what files carry: a mark (see `files`), but not when, and with which version of matplotlib, they were
-# written.
+# Extensions, and the metadata of files: a mark (see `system.files`), and no date or version of matplotlib, so that the
+# same picture gives the same bytes.
 FORMATS: dict[str, dict[str, str | None]] = {
     ".png": {"Software": "Sommerl"},
     ".pdf": {"Creator": "Sommerl", "Producer": None, "CreationDate": None},
@@ -50,7 +50,7 @@ def save(figure: Any, path: Path) -> None:
 
 
 def named(brdf: Materials) -> list[Material]:
-    """Materials with their names. Raises MaterialError if there are none, or more than line styles."""
+    """Materials with their names. Raises MaterialError if there are none, or more than MOST_MATERIALS."""
     found = [(brdf.name, brdf)] if isinstance(brdf, Brdf) else list(brdf.items())
     if not 1 <= len(found) <= MOST_MATERIALS:
         raise MaterialError(f"materials: expected 1 to {MOST_MATERIALS} in a picture, found {len(found)}")
@@ -58,23 +58,24 @@ def named(brdf: Materials) -> list[Material]:
 
 
 def text(name: str) -> str:
-    """A name as matplotlib shows it: a dollar is no formula, and no legend leaves it out for its first letter."""
+    """A name as text for matplotlib, which would take a dollar sign for a formula, and which leaves names that begin
+    with an underscore out of legends."""
     short = visible(name, LONGEST_NAME)
     return ("\u200b" if short.startswith("_") else "") + short.replace("$", r"\$")
 
 
 def number(value: float) -> str:
-    """Three digits, without an exponent."""
+    """A number with three significant digits and without an exponent."""
     return np.format_float_positional(value, 3, unique=False, fractional=False, trim="-")
 
 
 def colours(count: int) -> list[Any]:
-    """Colours of an increasing angle, dark to light, all readable on white."""
+    """Colours for increasing angles, from dark to light, all dark enough to be seen on white."""
     return list(matplotlib("matplotlib").colormaps["viridis"](np.linspace(0, 0.85, count)))
 
 
 def legend(ax: Any, materials: list[Material], angles: list[str], **where: Any) -> None:
-    """Says which colour is which angle and, of several materials, which line is whose."""
+    """Adds a legend: the angle of each colour and, if there are several materials, the material of each line style."""
     line = matplotlib("matplotlib.lines").Line2D
     handles = [line([], [], color=c, label=label) for c, label in zip(colours(len(angles)), angles, strict=True)]
     if len(materials) > 1:

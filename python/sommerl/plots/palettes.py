@@ -1,4 +1,4 @@
-"""The palette of a compressed material, and how often its entries are used."""
+"""Draws the palette of a compressed material, and how often its entries are used."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .tone import Tone
 def palette(ax: Any, material: Brdf) -> None:
     """Draws the palette of a compressed material as swatches.
 
-    Preset paper: the LUT's entries, from dark to bright, row by row from the top left, an image of shape (rows,
-    columns, 4), RGBA in 8 bits (`Tone`), transparent where a last row is not full.
+    Preset `paper`: the entries of the LUT, from dark to bright, row by row from the top left. The image has shape
+    (rows, columns, 4), RGBA in 8 bits (`Tone`), and is transparent at the end of a last row that is not full.
 
-    Preset compact: the palette is gains times shapes, and a swatch is their product, a column for each shape in the
-    LUT's order, a row for each gain, the largest at the top. What no node uses is transparent. Colours are those at
-    normal incidence, scale · max(0, gain · shape)³.
+    Preset `compact`: a swatch for each product of a gain and a shape. There is a column for each shape, in the LUT's
+    order, and a row for each gain, the largest at the top; products that no node uses are transparent. Colours are
+    those at normal incidence, scale · max(0, gain · shape)³.
 
     Raises MaterialError for a material that has no palette.
     """
@@ -42,15 +42,16 @@ def palette(ax: Any, material: Brdf) -> None:
     pixels[shown, :3] = tone.srgb8(f_r[shown])
     pixels[..., 3] = np.where(shown, 255, 0)
     ax.imshow(pixels, aspect="auto", interpolation="nearest")
-    ax.set_facecolor("0.6")  # or white products would look like unused ones
+    ax.set_facecolor("0.6")  # on white, white products would look like unused ones
     ax.set(xticks=[], yticks=[], title=title)
 
 
 def usage(ax: Any, material: Brdf) -> None:
-    """Draws how many cells above the horizon have each entry of the LUT, in the palette's order, dark to bright.
+    """Draws how often each entry is used.
 
-    Preset compact: how many nodes have each shape and each gain, in their order. The bars of each kind add up to the
-    number of cells or nodes. Raises MaterialError for a material that has no palette.
+    Preset `paper`: the number of cells above the horizon that have each entry, with entries from dark to bright. Preset
+    `compact`: the number of nodes that have each shape, and each gain, in the palette's order. The bars of a kind add
+    up to the number of cells or nodes. Raises MaterialError for a material that has no palette.
     """
     compressed = _compressed(material)
     entries, index = compressed.palette, compressed.index
@@ -77,17 +78,17 @@ def usage(ax: Any, material: Brdf) -> None:
 
 def _compressed(material: Brdf) -> SomManBrdf:
     if not isinstance(material, SomManBrdf):
-        raise MaterialError(f"{material.name}: expected a compressed material, with a palette, found another kind")
+        raise MaterialError(f"{material.name}: it has no palette, since it is not a compressed material")
     return material
 
 
 def _order(palette: Palette) -> NDArray[np.int64]:
-    """The LUT's entries from dark to bright."""
+    """The numbers of the LUT's entries, from dark to bright."""
     return np.argsort(palette.lut.sum(axis=1), kind="stable")
 
 
 def _swatches(palette: Palette) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """f_r of each swatch, and where there is one."""
+    """f_r of each swatch of a material on cells, and where there is a swatch."""
     entries = len(palette.lut)
     columns = int(np.ceil(np.sqrt(entries)))
     rows = -(-entries // columns)
@@ -97,7 +98,7 @@ def _swatches(palette: Palette) -> tuple[NDArray[np.float64], NDArray[np.bool_]]
 
 
 def _products(palette: GainsAndShapes, index: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """The same of gains times shapes."""
+    """The same for a material on nodes: the products of gains and shapes."""
     gains = np.argsort(-palette.gains, kind="stable")
     used = np.zeros((len(gains), len(palette.lut)), np.bool_)
     used[tuple(index)] = True

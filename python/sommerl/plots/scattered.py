@@ -1,4 +1,4 @@
-"""Where samples were measured, and where not."""
+"""Draws which directions a table of samples covers."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ INCIDENCES = (10, 45, 75)  # degrees
 
 
 def coverage(table: ScatteredTable, path: Path) -> None:
-    """Writes a PNG of which directions were measured: the share of φ_d over θ_h and θ_d, and the hemisphere of `wo` for
-    three elevations of `wi`. Raises MissingDependencyError without matplotlib."""
+    """Writes a PNG that shows which directions were measured: for each θ_h and θ_d the share of φ_d that is near a
+    sample, and the hemisphere of `wo` for three elevations of `wi`. Raises MissingDependencyError without
+    matplotlib."""
     with plain_style():
         figure = matplotlib().Figure(figsize=(13, 3.6), layout="constrained")
         share = f"{table.facts['coverage']:.1%} of the lattice (by solid angle and cosines)"
@@ -36,7 +37,9 @@ def coverage(table: ScatteredTable, path: Path) -> None:
 def _slices(ax: Any, table: ScatteredTable) -> None:
     above = table.lattice.above_horizon
     with np.errstate(invalid="ignore"):
-        share = (table.measured & above).sum(axis=2) / above.sum(axis=2)  # NaN, shown as nothing, below the horizon
+        share = (table.measured & above).sum(axis=2) / above.sum(
+            axis=2
+        )  # NaN below the horizon, where nothing is drawn
     image = ax.imshow(share, origin="lower", extent=(0, 90, 0, 1), aspect="auto", cmap="viridis", vmin=0, vmax=1)
     theta_h, theta_d, _ = half_diff(split(table.samples.wi), split(table.samples.wo))
     ax.plot(np.degrees(theta_d), np.sqrt(theta_h * 2 / np.pi), ".", color="white", markersize=1.5, alpha=0.5)

@@ -1,4 +1,4 @@
-"""Several pictures on one page."""
+"""Puts several pictures on one page."""
 
 from __future__ import annotations
 
@@ -24,7 +24,11 @@ COLUMNS = 3
 
 @dataclass(frozen=True)
 class Kind:
-    """A picture. shows: what, for people. together: several materials in one. applies: to which, if all are drawn."""
+    """A kind of picture.
+
+    draw: draws it into axes. shows: what it shows, for help texts. together: whether one picture shows several
+    materials. projection: of the axes. applies: whether it is drawn of a material when all kinds are asked for.
+    """
 
     draw: Callable[[Any, Any], object]
     shows: str
@@ -46,7 +50,7 @@ KINDS = {
     "theta-h": Kind(theta_h_slices, "f_r over θ_h, for several θ_d, at φ_d = 90°", together=True),
     "slices": Kind(slices, "an image of f_r over θ_h and θ_d, at φ_d = 90°"),
     "palette": Kind(palette, "the entries of a compressed material, as colours", applies=_has_palette),
-    "usage": Kind(usage, "how many cells have each of them", applies=_has_palette),
+    "usage": Kind(usage, "how many cells, or nodes, have each entry", applies=_has_palette),
     "hits": Kind(hits, "how often cells are hit by directions at equal steps (the paper's Fig. 2)", applies=_has_cells),
 }
 
@@ -54,11 +58,11 @@ Panel = tuple[str, str, Any]  # kind, name of the material, material or material
 
 
 def sheet(brdf: Materials, kind: str = "all") -> tuple[Any, list[str]]:
-    """A figure with one kind of picture, or with all that apply; and the names of the kinds on it, in `KINDS`.
+    """A figure with one kind of picture, or with all kinds that apply, and the names of these kinds.
 
-    brdf: one, or up to five by name, whose image slices are shown alike, at the first one's tones. Raises MaterialError
-    for a material that has no picture of the kind asked for, OptionError for an unknown kind, MissingDependencyError
-    without matplotlib.
+    brdf: one, or up to five by name; their image slices all use the tones of the first one. kind: a key of KINDS, or
+    "all". Raises MaterialError for a material of which that kind cannot be drawn, OptionError for an unknown kind,
+    MissingDependencyError without matplotlib.
     """
     if kind not in (*KINDS, "all"):
         raise OptionError(f"kind: expected {', '.join(KINDS)} or all, found {kind}")
@@ -77,7 +81,7 @@ def sheet(brdf: Materials, kind: str = "all") -> tuple[Any, list[str]]:
 
 
 def _lattices(materials: list[Material]) -> list[Material]:
-    """The materials that hits are drawn of: one for each lattice, as they are the same for all on it."""
+    """One material for each lattice: hits are the same for all materials on one lattice."""
     found: dict[Lattice | None, Material] = {}
     for label, one in materials:
         found.setdefault(one.grid, (label, one))
@@ -85,7 +89,7 @@ def _lattices(materials: list[Material]) -> list[Material]:
 
 
 def _arranged(shared: list[Panel], rows: list[list[Panel]]) -> list[list[Panel]]:
-    """Rows of panels: a row for each material if there are several, and more than one panel of one of them."""
+    """Panels in rows. Of several materials, each gets a row if one of them has more than one panel."""
     if len(rows) > 1 and max(map(len, rows)) > 1:
         return _flowing(shared) + rows
     return _flowing(shared + [panel for row in rows for panel in row])

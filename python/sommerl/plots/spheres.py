@@ -1,4 +1,4 @@
-"""A material and its fits, rendered."""
+"""Draws rendered spheres of a material and of its fits."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ COLUMNS = 6  # of a sheet of spheres
 
 
 def fits(name: str, models: Sequence[str], comparisons: Sequence[Comparison], path: Path) -> None:
-    """Writes a PNG: a material on a sphere, its fits with their PSNR over the object, and below each the differences,
-    eight times enlarged.
+    """Writes a PNG of spheres: the material, then each fit with its PSNR over the object, and below each fit the
+    difference from the material, times 8.
 
-    comparisons: of `compare_on_sphere`, one a model. Raises MissingDependencyError without matplotlib.
+    comparisons: from `compare_on_sphere`, one for each model. Raises MissingDependencyError without matplotlib.
     """
     figures = optional("matplotlib.figure", "matplotlib", "plots", "fit")
     with plain_style():

@@ -1,4 +1,4 @@
-"""How matplotlib is used: not as its user has set it up for other work."""
+"""Keeps matplotlib's user settings out of our pictures."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from ..system.optional import optional
 
 @contextmanager
 def plain_style() -> Generator[None]:
-    """Matplotlib as it comes, whatever the user's settings: same input, same picture."""
+    """Within the block, matplotlib uses its default settings: the same input gives the same picture for everybody."""
     library = optional("matplotlib", "matplotlib", "plots", "formats")
     with library.rc_context(), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing")  # names may be in any script
+        warnings.filterwarnings("ignore", "Glyph .* missing")  # a name may have letters that the font lacks
         library.rcdefaults()
-        library.rcParams["svg.hashsalt"] = "sommerl"  # else the names inside an SVG file are random
+        library.rcParams["svg.hashsalt"] = "sommerl"  # otherwise SVG files contain random identifiers
         yield

@@ -1,4 +1,4 @@
-"""From f_r to colours on a screen."""
+"""Converts f_r to colours on a screen."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from ..render.metrics import to_srgb8
 
 DARK, BRIGHT = 25, 99  # percentiles of what is shown
-HEADROOM = 10.0  # white is at least so many times the base: a material without a highlight is a mid grey
+HEADROOM = 10.0  # white is at least this many times `base`, so that a material without a highlight is a mid grey
 
 
 @dataclass(frozen=True)
 class Tone:
-    """A curve that shows a highlight and the base, ten thousand times as dark, in one picture.
+    """A logarithmic curve that shows a highlight and a base ten thousand times darker in one picture.
 
-    The largest channel c of a colour becomes log(1 + c / base) / log(1 + white / base), at most 1, and the others keep
-    their ratio to it: hues stay. It is linear well below `base`. base, white: f_r [1/sr].
+    The largest channel c of a colour becomes log(1 + c / base) / log(1 + white / base), at most 1; the other channels
+    keep their ratio to it, so that hues stay the same. Well below `base`, the curve is linear. base, white: f_r [1/sr].
     """
 
     base: float
@@ -26,7 +26,7 @@ class Tone:
 
     @classmethod
     def of(cls, f_r: NDArray[np.float64]) -> Tone:
-        """The curve for colours of shape (n, 3), by percentiles: near grazing, a few grow without bound."""
+        """The curve for colours (n, 3). It uses percentiles, since a few values near grazing angles may be huge."""
         brightest = f_r.max(axis=-1)
         positive = brightest[brightest > 0]
         if not positive.size:
@@ -35,11 +35,11 @@ class Tone:
         return cls(base, max(white, HEADROOM * base))
 
     def linear(self, f_r: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Linear RGB in [0, 1] of colours of shape (..., 3)."""
+        """Linear RGB in [0, 1] for f_r of shape (..., 3)."""
         brightest = f_r.max(axis=-1, keepdims=True)
         shown = np.minimum(np.log1p(brightest / self.base) / np.log1p(self.white / self.base), 1.0)
         return f_r * shown / np.where(brightest > 0, brightest, 1.0)
 
     def srgb8(self, f_r: NDArray[np.float64]) -> NDArray[np.uint8]:
-        """8-bit sRGB of colours of shape (..., 3)."""
+        """8-bit sRGB for f_r of shape (..., 3)."""
         return to_srgb8(self.linear(f_r))  # pyright: ignore

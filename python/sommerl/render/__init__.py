@@ -1,1 +1,1 @@
-"""Pictures by Mitsuba, and what is measured on them."""
+"""Renders pictures with Mitsuba, and measures differences between them. The only room that imports Mitsuba."""

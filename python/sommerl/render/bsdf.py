@@ -1,4 +1,4 @@
-"""A Mitsuba BSDF for any `Brdf`."""
+"""The Mitsuba plug-in `sommerl`: a BSDF for any `Brdf` (docs/mitsuba.md)."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from .llvm import drjit, mitsuba
 def make_bsdf(brdf: Brdf | Any, sampler: Sampler | None = None) -> Any:
     """A Mitsuba BSDF, to be put into a scene's dictionary. Only its front side reflects.
 
-    brdf: what is a Mitsuba BSDF already stays as it is, so that scenes take Mitsuba's own, to compare with.
-    sampler: of directions, see `sampling`; ours, fitted to `brdf`, if None. Give the reference's to every candidate
-        that it is compared with, so that all are rendered with the same directions.
+    brdf: a `Brdf`. A Mitsuba BSDF is returned unchanged, so that scenes can also show Mitsuba's own BSDFs.
+    sampler: draws the directions. If None, it is a `HalfVectorSampler` fitted to `brdf`. For a comparison, pass the
+        reference's sampler for all candidates, so that all are rendered with the same directions.
     """
     if isinstance(brdf, mitsuba().BSDF):
         return brdf
@@ -35,27 +35,29 @@ def make_bsdf(brdf: Brdf | Any, sampler: Sampler | None = None) -> Any:
 
 
 def register() -> None:
-    """Makes the plug-in `sommerl` known to scenes in Mitsuba's present variant, as Mitsuba's own Python plug-ins are.
+    """Registers the plug-in `sommerl` in Mitsuba's present variant, so that scenes can use it.
 
-    Properties: `filename`, a built-in's name or a path, which may be relative to the scene file; `interpolation`,
-    nearest or trilinear, if it is not to be the material's own; `sampler`, one of the names in `sampling.named`, if it
-    is not to be ours; `tint`, a colour or texture from 0 to 1, and `scale`, a number, which f_r is multiplied by;
-    `comment`, which is for people.
+    Properties: `filename`, the name of a built-in material or a path, which may be relative to the scene file;
+    `interpolation`, nearest or trilinear (default: the material's own); `sampler`, a name in `sampling.named` (default:
+    half-vector); `tint`, a colour or texture from 0 to 1, and `scale`, a number of at least 0, both of which multiply
+    f_r; `comment`, which is ignored.
     """
     mitsuba().register_bsdf("sommerl", _from_properties)
 
 
 def snippet(path: str | Path) -> dict[str, Any]:
-    """A material's dictionary, for `load_dict` after `register`, from a .json that `sommerl convert` wrote: the place
-    of the material, in the file relative to the file, is made absolute. Raises FormatError if it is no such file."""
+    """The dictionary in a .json file that `sommerl convert` wrote, for Mitsuba's `load_dict` after `register`.
+
+    The path of the material, which is relative to the file, is made absolute. Raises FormatError for other files.
+    """
     return scene.read(Path(path).absolute())
 
 
 def _from_properties(props: Any) -> Any:
     name = str(props["filename"])
     if "comment" in props:
-        props.mark_queried("comment")  # Mitsuba refuses what nobody reads
-    # Of "FILE:MEMBER", only the file is to be found; a colon may also be part of its name.
+        props.mark_queried("comment")  # Mitsuba refuses properties that are not read
+    # Of "FILE:MEMBER", only FILE is a path to resolve; but a colon may also be part of a file's name.
     resolve = mitsuba().file_resolver().resolve
     places = [(name, "")] + [(name[:at], name[at:]) for at, character in enumerate(name) if character == ":"]
     found = next((f"{place}{rest}" for file, rest in places if (place := Path(str(resolve(file)))).is_file()), name)
@@ -67,7 +69,7 @@ def _from_properties(props: Any) -> Any:
 
 
 def upload(buffer: NDArray[Any]) -> Any:
-    """A flat NumPy buffer as an array that Dr.Jit gathers from, one of shape () as a number."""
+    """A flat NumPy array as a Dr.Jit array, to gather from; one of shape () as a number."""
     mi, dr = mitsuba(), drjit()
     if mi.variant().startswith("scalar"):
         return buffer if buffer.ndim else float(buffer)
@@ -88,7 +90,7 @@ def upload(buffer: NDArray[Any]) -> Any:
 
 
 def _plugin() -> Any:
-    """The class for Mitsuba's present variant."""
+    """The plug-in's class for Mitsuba's present variant."""
     return _plugin_for(mitsuba().variant())
 
 
@@ -100,12 +102,12 @@ def _plugin_for(variant: str) -> Any:
     scalar = variant.startswith("scalar")
 
     def taken(active: Any, numbers: Triple, others: Triple) -> Triple:
-        """Three numbers where lanes are active; elsewhere others, since Mitsuba may have left anything there."""
+        """`numbers` in active lanes and `others` in all others, where Mitsuba may have left any values."""
         x, y, z = (dr.select(active, a, b) for a, b in zip(numbers, others, strict=True))
         return x, y, z
 
     def numbers(values: Any) -> Any:
-        """The same, as scalar variants need it: they know nothing of NumPy's numbers."""
+        """Values as Python numbers in scalar variants, which do not accept NumPy's numbers."""
         return tuple(map(float, values)) if scalar else values
 
     class SommerlBsdf(mi.BSDF):
@@ -125,7 +127,7 @@ def _plugin_for(variant: str) -> Any:
 
         def traverse(self, callback: Any) -> None:
             callback.put("tint", self._tint, +mi.ParamFlags.Differentiable)
-            if not scalar:  # whose numbers are Python's, which cannot be changed in place
+            if not scalar:  # scalar variants use Python's numbers, which cannot be changed in place
                 callback.put("scale", self._scale, +mi.ParamFlags.Differentiable)
 
         def parameters_changed(self, keys: Any = ()) -> None:
@@ -135,13 +137,13 @@ def _plugin_for(variant: str) -> Any:
             active = self._seen(ctx, si, active)
             u = taken(active, (sample1, sample2.x, sample2.y), middle)
             viewer = taken(active, _triple(si.wi), upright)
-            # A density of cells has no slope worth following: only f_r and the cosine are differentiated.
+            # The density is constant in each cell, so only f_r and the cosine are differentiated.
             wi, pdf = self._sampler.draw(dr.detach(viewer), dr.detach(u), self._tables)
             (pdf,) = numbers((pdf,))
             drawn = active & (pdf > 0.0)
             pdf = dr.select(drawn, pdf, 1.0)
             sample = dr.zeros(mi.BSDFSample3f)
-            # Below, where nothing is reflected to: `blendbsdf` weighs what it is given even if the density is 0.
+            # A direction below the horizon, where f_r is 0: `blendbsdf` uses it even if the density is 0.
             sample.wo = mi.Vector3f(*taken(drawn, numbers(wi), below))
             sample.pdf = dr.select(drawn, pdf, 0.0)
             sample.eta = 1.0
@@ -162,21 +164,21 @@ def _plugin_for(variant: str) -> Any:
             return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
 
         def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
-            """The share of even light that is reflected to the viewer, in [0, 1]: the albedo for denoisers."""
+            """The albedo for denoisers, in [0, 1]: of uniform light, the share that the viewer gets."""
             above = active & (si.wi.z > 0.0)
             cosine = dr.select(above, si.wi.z, 1.0)
             share = self._tinted(numbers(albedo_at(cosine, self._albedos)), si, above)
             return mi.depolarizer(dr.clip(share, 0.0, 1.0))
 
         def _seen(self, ctx: Any, si: Any, active: Any) -> Any:
-            """Where the front side is looked at, if what it does is asked for."""
+            """The lanes in which the viewer sees the front side, and glossy reflection is asked for."""
             return active & (si.wi.z > 0.0) & ctx.is_enabled(flags.GlossyReflection, 0)
 
         def _reflected(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
             """f_r times the cosine, without polarisation."""
             above = self._seen(ctx, si, active) & (wo.z > 0.0)
             viewer, light = (taken(above, _triple(w), upright) for w in (si.wi, wo))
-            # A path that starts at a lamp comes from the light and goes to the viewer.
+            # In paths that start at a lamp, Mitsuba's `si.wi` is the light, and `wo` the viewer.
             swapped = ctx.mode == mi.TransportMode.Importance
             pair = (viewer, light) if swapped else (light, viewer)
             return self._tinted(numbers(self._brdf.f_r(*pair, self._buffers)), si, above) * light[2]

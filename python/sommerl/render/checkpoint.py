@@ -1,4 +1,4 @@
-"""What a long render has reached, kept beside its output, so that the same command goes on from there."""
+"""Checkpoints: files in which a long render saves what it has reached, so that the same command can resume it."""
 
 from __future__ import annotations
 
@@ -27,17 +27,21 @@ from .frame import Image
 MAGIC, VERSION = b"SMRP", 1
 HEAD = struct.Struct("<IIII")  # length of the identity, number of images, passes, whether there is a sum of samples
 LONGEST_IDENTITY = 2**24  # bytes
-LARGEST_FILE = 2**31  # bytes: more than any sheet's
-CHUNK = 2**20
-LONGEST_NAME = 255 - 16  # bytes of a file's: a checkpoint that is set aside has a longer one
-SECONDS = 10.0  # of rendering that a kill may cost; what is done sooner is never written
-SHARE = 20  # … and at least that many times as long as writing takes
-PROBES = 1024  # pairs of directions at which a material is looked at
+LARGEST_FILE = 2**31  # bytes: more than any render needs
+CHUNK = 2**20  # bytes read at a time
+LONGEST_NAME = 255 - 16  # bytes of a file name, with room for ".damaged" and a number
+SECONDS = 10.0  # between two checkpoints at least; a shorter render writes none
+SHARE = 20  # … and at least this many times as long as writing one takes
+PROBES = 1024  # pairs of directions at which a material is evaluated for its hash
 
 
 @dataclass(frozen=True)
 class State:
-    """Images that are finished, and of the next one the sum of its samples (height, width, 3) and its passes so far."""
+    """What a render has reached.
+
+    images: those that are finished. total: the sum of samples of the next one, (height, width, channels). passes: the
+    number of its passes that are done.
+    """
 
     images: tuple[Image, ...] = ()
     total: NDArray[np.float64] | None = None
@@ -45,18 +49,18 @@ class State:
 
 
 class Checkpoint:
-    """A file that holds a state, and of which render.
+    """The checkpoint file of one render.
 
-    After what `sealed_file` writes come HEAD; the identity, JSON in UTF-8; of each image the pixels in single precision
-    and a byte a pixel of the mask; and the sum of samples in double precision.
+    The file has the head of `sealed_file`; HEAD; the identity, JSON in UTF-8; for each finished image its pixels in
+    single precision and its mask, a byte a pixel; and the sum of samples in double precision.
 
-    path: see `checkpoint_of`. identity: everything that decides the pixels, by a name that a person understands;
-    whatever else decides them is added by `render_all`. shape: height and width of the images. say: is given one
-    sentence if the file that is there does not serve, or none can be written. channels: of the sum of samples.
+    path: see `checkpoint_of`. identity: everything that the pixels depend on, under names for people; `render_all` adds
+    what it knows itself. shape: height and width of the images. say: called with one sentence if an existing file
+    cannot be used, or if the file cannot be written. channels: of the sum of samples.
     """
 
     path: Path
-    resumed: bool  #: whether the render went on from a state that was loaded
+    resumed: bool  #: whether the render was resumed from the file
     holds: bool  #: whether the file holds a state of this render
 
     def __init__(
@@ -68,7 +72,7 @@ class Checkpoint:
         *,
         channels: int = 3,
     ) -> None:
-        """Raises OptionError if something has that name that is no file."""
+        """Raises OptionError if `path` exists and is not a file."""
         self.path, self._identity, self._shape, self._say = path, dict(identity), shape, say
         self._channels = channels
         self.resumed = self.holds = False
@@ -76,7 +80,7 @@ class Checkpoint:
         self._last, self._cost = time.monotonic(), 0.0
         self._writable = True
         if path.exists() and not path.is_file():
-            raise OptionError(f"{path}: expected a checkpoint or nothing, found something else, which is kept")
+            raise OptionError(f"{path}: the render's checkpoint needs this name, which something else has: rename that")
         remove_left_over(path)
 
     @property
@@ -85,9 +89,10 @@ class Checkpoint:
         return self._shape[0] * self._shape[1]
 
     def load(self, identity: Mapping[str, str], images: int, passes: int) -> State:
-        """The state to go on from, of a render of so many images in so many passes each.
+        """The state to resume from. identity: what is added to the identity. images, passes: of the whole render.
 
-        An empty one if there is no file, or it holds another render; or if it is damaged: it gets another name then.
+        It is empty if there is no file, if the file is of another render, or if it is damaged; a damaged file is
+        renamed.
         """
         self._identity |= identity
         self._last = time.monotonic()
@@ -101,17 +106,17 @@ class Checkpoint:
         other = [key for key in self._identity | found if self._identity.get(key) != found.get(key)]
         if other:
             self._holds_another = True
-            sentence = f"expected the same render, found another {visible(other[0])}"
-            self._say(f"{self.path}: {sentence}; this one starts anew, and replaces it after {SECONDS:.0f} s")
+            why = f"it is of a render with another {visible(other[0])}"
+            self._say(f"{self.path}: {why}; this render starts anew, and replaces it after {SECONDS:.0f} s")
             return State()
         self.resumed = self.holds = True
         return state
 
     def save(self, state: State, *, now: bool = False) -> None:
-        """Writes the state, if enough time has passed to make that worth its cost, or `now`.
+        """Writes the state if enough time has passed since the last time (SECONDS and SHARE), or if `now` is set.
 
-        If it cannot, says so once: that is no reason to stop rendering. What another render has reached is not given up
-        for less than SECONDS of this one, whose options may be mistyped.
+        If the file cannot be written, the render goes on, and this is said once. The checkpoint of another render is
+        replaced only after SECONDS, even with `now`, since this render's options may have been mistyped.
         """
         started = time.monotonic()
         now = now and not self._holds_another
@@ -124,12 +129,12 @@ class Checkpoint:
         except (OSError, OptionError) as error:
             self._writable = False
             why = error.strerror if isinstance(error, OSError) else "something else has its name"
-            self._say(f"{self.path}: {why}; the render goes on, but could not be resumed from here")
+            self._say(f"{self.path}: {why}; the render goes on, but cannot be resumed if it is stopped")
         self._last = time.monotonic()
         self._cost = self._last - started
 
     def remove(self) -> None:
-        """The render is finished and written: its state goes; that of another render stays."""
+        """Removes the file once the image is written. The checkpoint of another render stays."""
         if self.holds:
             self.path.unlink(missing_ok=True)
 
@@ -144,7 +149,7 @@ class Checkpoint:
         sealed_file.write_sealed(out, MAGIC, VERSION, parts)
 
     def _decoded(self, images: int, passes: int) -> tuple[dict[str, str], State]:
-        """The identity in the file, and the state if it is that of this render. Raises FormatError."""
+        """The identity in the file, and the state, which is empty if the identity differs. Raises FormatError."""
         pixels = self.pixels
         head = sealed_file.PREFIX.size + HEAD.size + LONGEST_IDENTITY
         reader = self._reader(head + pixels * (13 * images + 8 * self._channels))
@@ -153,7 +158,7 @@ class Checkpoint:
         if found != self._identity:
             return found, State()
         if count > images or done > passes * (count < images) or there != (done > 0):
-            raise FormatError("expected as many images and passes as the render has, found more")
+            raise FormatError("it has more images or passes than the render")
         finished = tuple(
             Image(
                 np.frombuffer(reader.take(12 * pixels), "<f4").astype(np.float32).reshape(*self._shape, 3),
@@ -163,7 +168,7 @@ class Checkpoint:
         )
         total = self._total(reader) if there else None
         if reader.rest():
-            raise FormatError("expected the end of the file, found more")
+            raise FormatError("it has bytes after its end")
         return found, State(finished, total, done)
 
     def _total(self, reader: sealed_file.Reader) -> NDArray[np.float64]:
@@ -171,7 +176,10 @@ class Checkpoint:
         return np.frombuffer(data, "<f8").reshape(*self._shape, self._channels)
 
     def _reader(self, most: int) -> sealed_file.Reader:
-        """A reader of the file, checked as a whole: of as many bytes as this render can have written, and one more."""
+        """A reader of the file, whose checksum has been checked.
+
+        Only the first `most` + 1 bytes are kept in memory: this render cannot have written more than `most`.
+        """
         kept, crc, length = bytearray(), 0, 0
         with self.path.open("rb") as file:
             kept += file.read(sealed_file.PREFIX.size)
@@ -186,21 +194,21 @@ class Checkpoint:
         return sealed_file.Reader(data, sealed_file.PREFIX.size)
 
     def _set_aside(self, error: Exception) -> None:
-        """Keeps a file that does not serve under another name."""
+        """Renames a file that cannot be read, so that it is kept, and says so."""
         why = error.strerror if isinstance(error, OSError) else visible(str(error))
-        found = f"expected a checkpoint, found a damaged one or another file ({why})"
+        found = f"it is damaged or not a checkpoint ({why})"
         try:
             aside = next(path for path in _names_aside(self.path) if not path.exists())
             self.path.rename(aside)
         except OSError as failure:
             self._writable = False
-            self._say(f"{self.path}: {found}; the render starts anew, and keeps nothing ({failure.strerror})")
+            self._say(f"{self.path}: {found}; the render starts anew, without checkpoints ({failure.strerror})")
             return
         self._say(f"{self.path}: {found}; it is kept as {aside.name}, and the render starts anew")
 
 
 def checkpoint_of(output: Path) -> Path:
-    """Where the checkpoint of an image is kept."""
+    """The path of the checkpoint of an image."""
     name = f"{output.name}.sommerl-part"
     if len(os.fsencode(name)) > LONGEST_NAME:
         name = f"{hashlib.sha256(os.fsencode(output.name)).hexdigest()}.sommerl-part"
@@ -208,22 +216,24 @@ def checkpoint_of(output: Path) -> Path:
 
 
 def _names_aside(path: Path) -> Iterator[Path]:
+    """Names for a damaged file, of which the first free one is taken. Raises OSError if all are taken."""
     yield from (path.with_name(f"{path.name}.damaged{number}") for number in ("", *range(2, 1000)))
-    raise OSError(errno.EEXIST, "too many that are damaged")
+    raise OSError(errno.EEXIST, "there are too many damaged ones already")
 
 
 def _identity(text: bytes) -> dict[str, str]:
+    """The identity in a file. Raises FormatError if it is not a JSON object."""
     try:
         found = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise FormatError("expected an identity in JSON, found something else") from error
+        raise FormatError("its identity is not JSON") from error
     if not isinstance(found, dict):
-        raise FormatError("expected an identity, a JSON object, found something else")
+        raise FormatError("its identity is not a JSON object")
     return {str(key): str(value) for key, value in cast(dict[Any, Any], found).items()}
 
 
 def content(*arrays: NDArray[Any]) -> str:
-    """A hash of arrays."""
+    """A hash of the types, shapes and values of arrays."""
     digest = hashlib.sha256()
     for array in arrays:
         digest.update(f"{array.dtype} {array.shape}".encode())
@@ -232,7 +242,7 @@ def content(*arrays: NDArray[Any]) -> str:
 
 
 def content_of(brdf: Brdf) -> str:
-    """A hash of a material: of what it reads, and of its values at fixed directions, which tell formulas apart."""
+    """A hash of a material: of its buffers, and of its values at fixed directions, which differ between formulas."""
     directions = np.random.Generator(np.random.PCG64(0)).random((2, PROBES, 3)) * [2, 2, 1] - [1, 1, 0]
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
     buffers = brdf.buffers()

@@ -1,4 +1,4 @@
-"""Linear RGB as what Mitsuba's present variant calculates with: RGB, luminance, or a spectrum."""
+"""Converts linear RGB to the colours of Mitsuba's present variant: RGB, luminance, or a spectrum."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from .llvm import mitsuba
 
 LUMINANCE = 0.212671, 0.715160, 0.072169  # of Rec. 709 primaries: Mitsuba's numbers
 SIDE = 64  # of the table of spectra
-BRIGHTEST = 0.5  # that the largest channel of a colour is scaled to before it is looked up; Mitsuba does so, too
+BRIGHTEST = 0.5  # colours are scaled so that their largest channel is this before they are looked up, as in Mitsuba
 
 
 def converter(upload: Callable[[NDArray[Any]], Any]) -> Callable[[Triple, Any], Any]:
     """A function from RGB components and wavelengths [nm] to a value of the variant's type `mi.UnpolarizedSpectrum`.
 
-    upload: makes a flat NumPy array one that can be gathered from; it is called now, and not while rendering.
+    upload: makes an array that can be gathered from out of a flat NumPy array. It is called now, not while rendering.
     """
     mi = mitsuba()
     variant = mi.variant()
@@ -34,9 +34,9 @@ def converter(upload: Callable[[NDArray[Any]], Any]) -> Callable[[Triple, Any], 
 
 def spectrum(rgb: Triple, wavelengths: Any, table: Any) -> list[Any]:
     """The smooth spectrum of a colour at wavelengths [nm]: Jakob & Hanika 2019, "A Low-Dimensional Function Space for
-    Efficient Spectral Upsampling". A colour is scaled to BRIGHTEST, its spectrum is scaled back.
+    Efficient Spectral Upsampling". The colour is scaled to BRIGHTEST for the lookup, and its spectrum is scaled back.
 
-    rgb: components, taken for 0 where they are negative. table: of `_spectra`, uploaded.
+    rgb: three components; negative ones count as 0. table: from `_spectra`, uploaded.
     """
     f = ops(rgb[0])
     r, g, b = (f.maximum(c, 0.0) for c in rgb)
@@ -61,8 +61,11 @@ def spectrum(rgb: Triple, wavelengths: Any, table: Any) -> list[Any]:
 
 @cache
 def _spectra() -> NDArray[np.float32]:
-    """Coefficients of the spectra of colours whose largest channel is BRIGHTEST: which one it is, and the shares of it
-    that the second next and the next channel have, flat."""
+    """The coefficients of the spectra of colours whose largest channel is BRIGHTEST, as a flat array.
+
+    Its axes are: which channel is the largest; the channel before that one, from 0 to BRIGHTEST; the channel after it,
+    likewise (both cyclically in r, g, b); and the three coefficients.
+    """
     fetch, shares = mitsuba().srgb_model_fetch, np.linspace(0.0, BRIGHTEST, SIDE)
     colours = [np.roll([BRIGHTEST, x, y], k).tolist() for k in range(3) for y in shares for x in shares]
     return np.array([fetch(colour) for colour in colours], np.float32).reshape(-1)

@@ -1,4 +1,4 @@
-"""A reference and a candidate, rendered alike, and how far they are apart."""
+"""Renders a reference and candidates in the same way, and measures how much they differ."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .scenes import sphere
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two renderings of one scene, and their distance."""
+    """Two renderings of one scene, and how much they differ."""
 
     reference: Image
     candidate: Image
@@ -28,16 +28,16 @@ class Comparison:
 
     @classmethod
     def of(cls, reference: Image, candidate: Image) -> Comparison:
-        """Measures over the object's pixels, which are the same in both."""
+        """Measures the difference of two images whose objects cover the same pixels."""
         return cls(reference, candidate, image_metrics(reference.pixels, candidate.pixels, reference.mask))
 
     def exposed(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-        """Reference and candidate in 8 bits at the reference's exposure."""
+        """Reference and candidate as 8-bit sRGB, both at the reference's exposure."""
         scale = exposure(self.reference.pixels, self.reference.mask)
         return to_srgb8(self.reference.pixels * scale), to_srgb8(self.candidate.pixels * scale)
 
     def pictures(self) -> list[NDArray[np.uint8]]:
-        """Reference, candidate and their difference (×8), in 8 bits at the reference's exposure."""
+        """Reference, candidate, and 8 times their absolute difference, as 8-bit sRGB at the reference's exposure."""
         a, b = self.exposed()
         return [a, b, difference(a, b)]
 
@@ -52,10 +52,11 @@ def compare_on_sphere(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> list[Comparison]:
-    """Renders the scene `sphere` with the reference and with each candidate, and measures.
+    """Renders the scene `sphere` with the reference and with each candidate, and compares them.
 
-    All are rendered with the reference's sampler and seed, hence with the same directions: what differs is the
-    representation and not the noise.
+    All are rendered with the reference's sampler and the same seed, and so with the same directions. The differences
+    then show the representation and not the noise. environment: radiance of shape (height, width, 3). size: of the
+    images, in pixels. spp: samples a pixel.
     """
     sampler = HalfVectorSampler.fitted(reference)
     scenes = [partial(sphere, brdf, environment, sampler=sampler, size=size) for brdf in (reference, *candidates)]
@@ -64,9 +65,9 @@ def compare_on_sphere(
 
 
 def judge_on_sphere(reference: Brdf, environment: NDArray[np.float32]) -> Callable[[Brdf], float]:
-    """A function that gives a candidate's PSNR over the object [dB], as `compare_on_sphere` does with its defaults.
+    """A function that gives a candidate's PSNR over the object [dB], as `compare_on_sphere` with its defaults gives it.
 
-    The reference is rendered once.
+    It renders the reference only once.
     """
     sampler = HalfVectorSampler.fitted(reference)
     first = render(sphere(reference, environment, sampler=sampler))

@@ -1,4 +1,4 @@
-"""Environments that light a scene: latitude-longitude images in linear RGB."""
+"""Environments, which light a scene: latitude-longitude images in linear RGB."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ GROUND, HORIZON, ZENITH = (0.020, 0.017, 0.014), (0.070, 0.072, 0.078), (0.028, 
 
 
 def default_environment(height: int = 512) -> NDArray[np.float32]:
-    """The environment that needs no download: a dim sky, and five lights from large and soft to small and very bright.
+    """The built-in environment: a dim sky, and five lights, from large and soft ones to small and very bright ones.
 
-    Returns radiance of shape (height, 2 · height, 3). The first row is the zenith; the middle column is behind the
-    camera of the scenes here. Each light is a Gaussian in angle.
+    Returns radiance of shape (height, 2 · height, 3). The first row is the zenith, and the middle column is behind the
+    camera of our scenes. The radiance of each light is a Gaussian in the angle from its centre.
     """
     elevation = np.pi / 2 - (np.arange(height) + 0.5) / height * np.pi
     azimuth = (np.arange(2 * height) + 0.5) / height * np.pi - np.pi
@@ -48,36 +48,36 @@ def default_environment(height: int = 512) -> NDArray[np.float32]:
 
 
 def load_environment(path: Path, warn: Callable[[str], None] = lambda sentence: None) -> NDArray[np.float32]:
-    """A latitude-longitude image (OpenEXR, Radiance HDR, PFM), linear RGB, of shape (height, width, 3).
+    """Reads a latitude-longitude image (OpenEXR, Radiance HDR, PFM); returns linear RGB, (height, width, 3).
 
-    warn: is told of an image that is not twice as wide as high, which then lights the scene distorted. Raises
-    FormatError if it cannot be read, is larger than 2²⁶ pixels, is an image of low dynamic range (PNG, JPEG), or holds
-    values that no light has.
+    warn: called with one sentence if the image is not twice as wide as high, so that it is stretched. Raises
+    FormatError if it cannot be read, has more than 2²⁶ pixels, has a low dynamic range (PNG, JPEG), is black, or has
+    values that are negative or not finite.
     """
     data = door.read(path, LARGEST_FILE, "an environment image")
     kind = image_heads.kind_of(data)
     if kind == "LDR":
-        # It would light the scene all the same, with lamps no brighter than paper.
-        raise FormatError(f"{path}: expected radiance in numbers that go beyond white (.exr, .hdr), found an LDR image")
+        # It could be decoded, but its lamps would be no brighter than white paper.
+        raise FormatError(f"{path}: expected an image of high dynamic range (.exr, .hdr, .pfm), found an LDR image")
     try:
         image_heads.check(kind, data)
         linear = hdr.decode(data) if kind == "RGBE" else _decoded(data, kind)
     except FormatError:
         raise
-    except Exception as error:  # of many kinds, as UnicodeDecodeError where its own sentence quotes the file
-        raise FormatError(f"{path}: expected an environment image, found something unreadable") from error
+    except Exception as error:  # of many classes, even UnicodeDecodeError if Mitsuba's message quotes the file
+        raise FormatError(f"{path}: it is not an OpenEXR, Radiance HDR or PFM image that can be read") from error
     if not (np.isfinite(linear).all() and (linear >= 0).all() and linear.any()):
-        raise FormatError(f"{path}: expected finite, non-negative radiance, found other values or only black")
+        raise FormatError(f"{path}: the image is black, or has radiance that is negative or not finite")
     height, width, _ = linear.shape
     if width != 2 * height:
-        warn(f"{path}: expected an environment twice as wide as high, found {width} × {height}: it is stretched")
+        warn(f"{path}: the image has {width} × {height} pixels, and is stretched to be twice as wide as high")
     return linear
 
 
 def _decoded(data: bytes, kind: str) -> NDArray[np.float32]:
-    """Linear RGB, by Mitsuba. Raises whatever it does."""
+    """Linear RGB, decoded by Mitsuba. Raises errors of any class."""
     mi = mitsuba()
-    # From a file, and not from memory: Mitsuba's streams of memory have no end, and it would wait for one.
+    # From a file: Mitsuba would never reach the end of a stream in memory.
     with door.copied(data, ".image") as copy:
         bitmap = mi.Bitmap(str(copy), getattr(mi.Bitmap.FileFormat, kind))
     return np.array(bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False))

@@ -1,4 +1,4 @@
-"""What is rendered, and what comes of it."""
+"""The scene that is rendered, and the image that it gives."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Image:
-    """A rendered frame: linear RGB (height, width, 3), and which pixels' centres show an object (height, width)."""
+    """A rendered image. pixels: linear RGB, (height, width, 3). mask: which pixels show an object at their centre."""
 
     pixels: NDArray[np.float32]
     mask: NDArray[np.bool_]
@@ -19,7 +19,7 @@ class Image:
 
 @dataclass(frozen=True)
 class Scene:
-    """A Mitsuba scene, and the names of those of its shapes that carry the materials: its objects."""
+    """A Mitsuba scene. objects: the names of the shapes that have the materials to be shown or compared."""
 
     mitsuba: Any
     objects: tuple[str, ...]

@@ -1,6 +1,6 @@
 """Radiance's .hdr images (Ward, "Real Pixels", Graphics Gems II, 1991): three mantissas and a common exponent a pixel.
 
-Read here, and not by Mitsuba, whose decoder writes beyond its memory where a run is longer than its line.
+Mitsuba's own decoder is not used, since it writes beyond its memory if a file has a run that is longer than its line.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 MAGIC = b"#?RADIANCE", b"#?RGBE"
 LONGEST_HEAD = 2**16
-SHORTEST, LONGEST = 8, 2**15 - 1  # lines that may be in runs
+SHORTEST, LONGEST = 8, 2**15 - 1  # pixels of a line that may be run-length encoded
 
 
 def size(data: bytes) -> tuple[int, int, int]:
-    """Width and height, and where the pixels begin. Raises ValueError for a head that is none."""
+    """Width, height, and the position of the first pixel. Raises ValueError if there is no valid head."""
     found = re.search(rb"\n-Y (\d{1,9}) \+X (\d{1,9})\n", data[:LONGEST_HEAD])
     if not found or not re.search(rb"\nFORMAT=32-bit_rle_rgbe\s*\n", data[: found.start() + 1]):
-        raise ValueError("no lines with a format and a size, as -Y 512 +X 1024")
+        raise ValueError("no lines with a format and a size like -Y 512 +X 1024")
     return int(found[2]), int(found[1]), found.end()
 
 
@@ -40,7 +40,7 @@ def decode(data: bytes) -> NDArray[np.float32]:
 
 
 def _line(data: bytes, at: int, width: int) -> tuple[bytes, int]:
-    """The bytes of a line of pixels, channel after channel, and what comes after them."""
+    """Decodes a run-length encoded line: its bytes, channel after channel, and the position after it."""
     if data[at : at + 4] != bytes((2, 2, width >> 8, width & 255)):
         raise ValueError("a line of another width")
     at += 4

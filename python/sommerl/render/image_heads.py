@@ -1,5 +1,7 @@
-"""What files of radiance say of themselves in their first lines, before anything is decoded: OpenEXR, Radiance HDR and
-portable float maps. Their decoder believes it, and would take as much memory and time as a few bytes ask for.
+"""Checks the headers of OpenEXR, Radiance HDR and PFM images before they are decoded.
+
+The decoders believe the size that a header gives, and a file of a few bytes could make them take any amount of memory
+and time.
 """
 
 from __future__ import annotations
@@ -14,14 +16,14 @@ from . import hdr
 MOST_PIXELS = 2**26  # 8192 × 8192
 MOST_VALUES = 2**28  # of all channels
 MOST_CHANNELS = 64
-LONGEST_HEAD = 2**20
+LONGEST_HEAD = 2**20  # bytes
 EXR, PFM = b"v/1\x01", (b"PF", b"Pf")
 LDR = b"\x89PNG", b"\xff\xd8\xff", b"BM", b"P3", b"P5", b"P6"
-PARTS, DEEP = 0x1000, 0x0800
+PARTS, DEEP = 0x1000, 0x0800  # flags of OpenEXR: several parts, deep pixels
 
 
 def kind_of(data: bytes) -> str:
-    """The name of the format, as Mitsuba calls it; "LDR" for one that holds no radiance, "" for any other."""
+    """Mitsuba's name of an image's format; "LDR" for formats of low dynamic range, "" for unknown ones."""
     if data.startswith(EXR):
         return "OpenEXR"
     if data.startswith(hdr.MAGIC):
@@ -32,7 +34,7 @@ def kind_of(data: bytes) -> str:
 
 
 def check(kind: str, data: bytes) -> None:
-    """Raises ValueError for a head that is none, or that asks for more than MOST_PIXELS."""
+    """Raises ValueError if a header is not valid, or gives more than MOST_PIXELS or MOST_VALUES."""
     sizes = {"OpenEXR": _exr, "RGBE": _hdr, "PFM": _pfm}[kind](data)
     for width, height, channels in sizes:
         values = width * height * channels
@@ -53,7 +55,7 @@ def _pfm(data: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def _exr(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Every window and every tile of all parts, with their channels."""
+    """Yields width, height and channels of every window and every tile of all parts. Raises ValueError."""
     version = struct.unpack_from("<I", data, 4)[0]
     if version & DEEP:
         raise ValueError("deep pixels")
@@ -76,7 +78,7 @@ def _exr(data: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def _attributes(data: bytes, parts: bool) -> Iterator[tuple[int, bytes, bytes]]:
-    """The number of the part, and type and value, of every attribute. Raises ValueError where the head is cut off."""
+    """Yields the part, the type and the value of every attribute. Raises ValueError if the header is cut off."""
     at, part = 8, 0
     while True:
         name, at = _word(data, at)
@@ -97,7 +99,7 @@ def _attributes(data: bytes, parts: bool) -> Iterator[tuple[int, bytes, bytes]]:
 
 
 def _word(data: bytes, at: int) -> tuple[bytes, int]:
-    """The text up to the next zero, and what comes after that."""
+    """The bytes up to the next zero byte, and the position after it."""
     end = data.find(b"\0", at, at + 256)
     if end < 0:
         raise ValueError("a head that is cut off")
@@ -105,7 +107,7 @@ def _word(data: bytes, at: int) -> tuple[bytes, int]:
 
 
 def _channels(value: bytes) -> int:
-    """The number of channels in a list of them, each with a name and 16 bytes."""
+    """The number of channels in a list, in which each has a name, a zero byte and 16 bytes."""
     at = count = 0
     while at < len(value) and value[at] and count <= MOST_CHANNELS:
         _, at = _word(value, at)

@@ -1,4 +1,4 @@
-"""Meshes: from files, and made from formulas, so that every scene renders with no download."""
+"""Reads meshes from files, and makes meshes by formula, so that scenes need no download."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from ..system.errors import FormatError
 from .llvm import mitsuba
 
 LARGEST_FILE = 2**30  # bytes
-HEADER_BYTES = 2**16  # of a PLY file
-SHORTEST = 1e-3  # normal that has a direction
+HEADER_BYTES = 2**16  # in which the header of a PLY file has to end
+SHORTEST = 1e-3  # a shorter normal in a file counts as missing
 Floats = NDArray[np.float64]
 
 
@@ -26,8 +26,8 @@ Floats = NDArray[np.float64]
 class Mesh:
     """Triangles with smooth normals, which point outwards: the side that reflects.
 
-    positions, normals: (n, 3), y up. faces: (m, 3), numbers of vertices, anticlockwise from outside. found: what a file
-    lacked and was made up for, in one sentence; "" for nothing.
+    positions, normals: (n, 3), y up. faces: (m, 3), numbers of vertices, anticlockwise seen from outside. found: one
+    sentence that says what was missing or wrong in the file and was corrected; "" if nothing was.
     """
 
     name: str
@@ -37,15 +37,15 @@ class Mesh:
     found: str = ""
 
     def standing(self, size: float = 1.0) -> Mesh:
-        """The same mesh on the plane y = 0, its bounding box about the y axis and scaled so that its longest side,
-        which is the height of a statue, is `size`."""
+        """The same mesh, standing on the plane y = 0, with its bounding box centred on the y axis, and scaled so that
+        the longest side of the box is `size`."""
         low, high = self.positions.min(axis=0).astype(float), self.positions.max(axis=0).astype(float)
         foot = (low + high) / 2 * [1, 0, 1] + low * [0, 1, 0]
         positions = (self.positions - foot) * (size / (high - low).max())
         return replace(self, positions=positions.astype(np.float32))
 
     def turned(self, degrees: float) -> Mesh:
-        """The same mesh, turned about the y axis, anticlockwise from above."""
+        """The same mesh, turned about the y axis, anticlockwise seen from above."""
         c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
         turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]], np.float32)
         return replace(self, positions=self.positions @ turn.T, normals=self.normals @ turn.T)
@@ -70,27 +70,29 @@ class Mesh:
 
 
 def load_mesh(path: Path) -> Mesh:
-    """The mesh in a Wavefront OBJ or a PLY file, of triangles.
+    """Reads a mesh of triangles from a Wavefront OBJ or a PLY file.
 
-    Normals that are missing are computed, and a mesh that is inside out is turned. Raises FormatError for any other
-    file, and for one that has no surface, no height or vertices that are not numbers.
+    Missing normals are computed, and faces and normals that point inwards are turned (see `Mesh.found`). Raises
+    FormatError for other files, and for a mesh without faces, without height, or with coordinates that are not finite.
     """
     with door.opened(path, "a mesh") as file:
         kind = path.suffix.lower().removeprefix(".")
         if kind not in ("obj", "ply"):
-            raise FormatError(f"{path}: expected a mesh in a file named .obj or .ply, found {path.suffix!r}")
+            raise FormatError(f"{path}: expected a mesh whose name ends in .obj or .ply, found {path.suffix!r}")
         data = file.read(LARGEST_FILE)
     positions, faces, normals = _read(path, kind, data)
     if not len(faces):
-        raise FormatError(f"{path}: expected triangles, found none")
+        raise FormatError(f"{path}: the mesh has no triangles")
     if not np.isfinite(positions).all():
-        raise FormatError(f"{path}: expected finite coordinates, found others")
+        raise FormatError(f"{path}: the mesh has coordinates that are not finite numbers")
     if faces.max() >= len(positions):
-        raise FormatError(f"{path}: expected faces of {len(positions)} vertices, found vertex number {faces.max()}")
+        raise FormatError(
+            f"{path}: a face has vertex number {faces.max()}, but there are only {len(positions)} vertices"
+        )
     if not np.ptp(positions[:, 1]) > 0:
-        raise FormatError(f"{path}: expected a mesh that has a height along y, found a flat one")
+        raise FormatError(f"{path}: the mesh is flat, without any height along y")
     notes: list[str] = []
-    computed = normals is None or not (np.abs(normals).max(axis=-1) > SHORTEST).all()  # nor is NaN, which stays NaN
+    computed = normals is None or not (np.abs(normals).max(axis=-1) > SHORTEST).all()  # False for NaN, too
     if normals is None or computed:
         normals = vertex_normals(positions, faces)
         notes.append("it has no vertex normals: they are computed from its faces")
@@ -108,14 +110,14 @@ def load_mesh(path: Path) -> Mesh:
 def _read(
     path: Path, kind: str, data: bytes
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.float32] | None]:
-    """Positions, faces, and normals if the file has them, by Mitsuba's readers."""
+    """Positions, faces, and the normals or None, as Mitsuba reads them. kind: "obj" or "ply"."""
     mi = mitsuba()
     if kind == "ply":
         _check_counts(path, data)
     given = _has_normals(data, kind)
     try:
         with door.copied(data, f".{kind}") as copy:
-            # Left to itself, Mitsuba computes normals that are missing before anybody has looked at the faces.
+            # Without `face_normals`, Mitsuba would compute missing normals from faces that we have not checked yet.
             mesh = mi.load_dict({"type": kind, "filename": str(copy), "face_normals": not given})
         parameters = mi.traverse(mesh)
         positions = np.array(parameters["vertex_positions"], np.float32).reshape(-1, 3)
@@ -123,23 +125,23 @@ def _read(
         normals = np.array(parameters["vertex_normals"], np.float32).reshape(-1, 3) if given else None
     except FormatError:
         raise
-    except Exception as error:  # of many kinds, as UnicodeDecodeError where its own sentence quotes the file
-        raise FormatError(f"{path}: expected a mesh of triangles, found something unreadable") from error
+    except Exception as error:  # of many classes, even UnicodeDecodeError if Mitsuba's message quotes the file
+        raise FormatError(f"{path}: it is not a mesh of triangles that Mitsuba can read") from error
     return positions, faces, normals if normals is None or normals.shape == positions.shape else None
 
 
 def _check_counts(path: Path, data: bytes) -> None:
-    """Raises FormatError if a PLY file says that it holds more than it can: Mitsuba would make room for all of it."""
+    """Raises FormatError if a PLY file announces more than it can hold: Mitsuba would allocate memory for all of it."""
     if b"end_header" not in data[:HEADER_BYTES]:
-        raise FormatError(f"{path}: expected a PLY file's head within {HEADER_BYTES} bytes, found none")
+        raise FormatError(f"{path}: its first {HEADER_BYTES} bytes hold no complete header of a PLY file")
     for count in re.findall(rb"^\s*element\s+\S+\s+(\S+)", _head(data), re.MULTILINE):
         if not (count.isdigit() and len(count) < 20 and int(count) <= len(data)):
-            found = f"{count[:20].decode('ascii', 'replace')} in {len(data)} bytes"
-            raise FormatError(f"{path}: expected a mesh with as many elements as it says, found {found}")
+            announced = count[:20].decode("ascii", "replace")
+            raise FormatError(f"{path}: its header announces {announced} elements, too many for {len(data)} bytes")
 
 
 def _has_normals(data: bytes, kind: str) -> bool:
-    """Whether all faces name normals (OBJ), or all vertices have some (PLY). Others, Mitsuba would leave undefined."""
+    """Whether all faces (OBJ) or vertices (PLY) have normals. If only some have, Mitsuba leaves others undefined."""
     if kind == "obj":
         words = (line.split(None, 2) for line in io.BytesIO(data))
         corners = [found[1] for found in words if found[:1] == [b"f"] and len(found) > 1]
@@ -148,14 +150,15 @@ def _has_normals(data: bytes, kind: str) -> bool:
 
 
 def _head(data: bytes) -> bytes:
-    """The lines of a PLY file before its data."""
+    """The header of a PLY file."""
     return data[:HEADER_BYTES].partition(b"end_header")[0]
 
 
 def vertex_normals(positions: NDArray[np.float32], faces: NDArray[np.uint32]) -> NDArray[np.float32]:
-    """Unit normals (n, 3) of vertices: the mean of their faces', by the faces' areas. (0, 1, 0) where there is none.
+    """Unit normals (n, 3) of vertices: the mean of the normals of their faces, weighted by area.
 
-    Vertices at one place, as where texture coordinates have a seam, get the same.
+    Vertices at the same position, as at a seam of texture coordinates, get the same normal. Vertices without a face, or
+    with faces of no area, get (0, 1, 0).
     """
     _, place = np.unique(positions, axis=0, return_inverse=True)
     place = place.reshape(-1)
@@ -167,19 +170,19 @@ def vertex_normals(positions: NDArray[np.float32], faces: NDArray[np.uint32]) ->
 
 
 def _face_normals(positions: NDArray[np.float32], faces: NDArray[np.uint32]) -> Floats:
-    """Of each face, twice its area long."""
+    """The normals of faces, each as long as twice the area of its face."""
     a, b, c = (positions[faces[:, k]].astype(np.float64) for k in range(3))
     return np.cross(b - a, c - a)
 
 
 def _agreement(positions: NDArray[np.float32], faces: NDArray[np.uint32], normals: NDArray[np.float32]) -> float:
-    """How far normals are on the side that faces are anticlockwise from: negative if most are on the other."""
+    """Positive if most vertex normals point to the side from which their faces are anticlockwise, else negative."""
     of_corners = normals[faces].astype(np.float64).sum(axis=1)
     return float((_face_normals(positions, faces) * of_corners).sum())
 
 
 def _volume(positions: NDArray[np.float32], faces: NDArray[np.uint32]) -> float:
-    """The signed volume: positive if faces are anticlockwise from outside."""
+    """The signed volume: positive if faces are anticlockwise seen from outside."""
     corners = positions[faces[:, 0]].astype(np.float64) - positions.mean(axis=0)
     return float((corners * _face_normals(positions, faces)).sum() / 6)
 
@@ -195,8 +198,8 @@ def lathe(
     """A closed surface of revolution about the y axis.
 
     outline: control points (radius, height) of a quadratic B-spline, from the lower end of the axis to the upper one;
-    a point given twice makes a sharper edge. relief: how far the surface is moved along its normal, at heights y and
-    azimuths φ [rad].
+    repeating a point makes a sharper edge. rows, columns: of the grid of vertices. relief: a function of heights y and
+    azimuths φ [rad] that gives how far the surface is moved along its normal.
     """
     curve = _resampled(_rounded(np.array(outline, float)), rows + 1)
     tangent = np.gradient(curve, axis=0)
@@ -217,7 +220,7 @@ def lathe(
 
 
 def knot(name: str, *, rows: int = 800, columns: int = 60) -> Mesh:
-    """A trefoil of a rope of five strands, upright, about 2 high: smooth, curved all ways, and it reflects itself."""
+    """An upright trefoil knot of a rope of five strands, about 2 high. It is smooth, and reflects itself."""
     t = (np.arange(rows) / rows * 2 * np.pi)[:, None]
     theta = np.arange(columns) / columns * 2 * np.pi
 
@@ -227,7 +230,8 @@ def knot(name: str, *, rows: int = 800, columns: int = 60) -> Mesh:
 
     centre, tangent = along(t), along(t + 1e-5) - along(t - 1e-5)
     tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
-    # The normal of the torus that the knot winds about: unlike a frame carried along, it closes.
+    # A frame from the normal of the torus that the knot winds around: a frame that is transported along the curve would
+    # not meet itself at the end.
     ring = 0.62 * np.concatenate([np.cos(2 * t), np.sin(2 * t), 0 * t], axis=-1)
     normal = centre - ring
     normal -= (normal * tangent).sum(axis=-1, keepdims=True) * tangent
@@ -240,7 +244,7 @@ def knot(name: str, *, rows: int = 800, columns: int = 60) -> Mesh:
 
 
 def _quads(number: NDArray[np.int64], *, closed: bool) -> list[NDArray[np.int64]]:
-    """Triangles of a grid of vertices that is closed in its columns, and maybe in its rows."""
+    """The triangles of a grid of vertices that is periodic in its columns and, if `closed`, in its rows."""
     if closed:
         number = np.concatenate([number, number[:1]])
     a, b = number[:-1], number[1:]
@@ -249,13 +253,14 @@ def _quads(number: NDArray[np.int64], *, closed: bool) -> list[NDArray[np.int64]
 
 
 def _mesh(name: str, positions: Floats, faces: list[NDArray[np.int64]]) -> Mesh:
+    """A mesh from positions (n, 3) and groups of triangles, with normals computed from its faces."""
     points = positions.astype(np.float32)
     triangles = np.concatenate([face.reshape(-1, 3) for face in faces]).astype(np.uint32)
     return Mesh(name, points, triangles, vertex_normals(points, triangles))
 
 
 def _rounded(points: Floats, times: int = 5) -> Floats:
-    """The curve that cutting corners off a polygon leads to (Chaikin 1974), its ends kept."""
+    """Smooths a polygon by cutting its corners repeatedly (Chaikin 1974); its ends stay."""
     for _ in range(times):
         a, b = points[:-1], points[1:]
         cut = np.stack([0.75 * a + 0.25 * b, 0.25 * a + 0.75 * b], axis=1).reshape(-1, 2)
@@ -264,7 +269,7 @@ def _rounded(points: Floats, times: int = 5) -> Floats:
 
 
 def _resampled(points: Floats, count: int) -> Floats:
-    """So many points at equal steps along a polygon."""
+    """Points at equal distances along a polygon."""
     length = np.append(0, np.linalg.norm(np.diff(points, axis=0), axis=-1).cumsum())
     at = np.linspace(0, float(length[-1]), count)
     return np.stack([np.interp(at, length, points[:, k]) for k in range(2)], axis=-1)

@@ -1,7 +1,7 @@
-"""How far a rendered candidate is from a rendered reference.
+"""Measures how much a rendered candidate differs from a rendered reference.
 
-The metrics judge what a viewer sees: 8-bit sRGB pixels at an exposure taken from the reference. One PSNR is without
-the rounding to 8 bits, which hides some small differences and enlarges others.
+The metrics are computed on what a viewer sees: 8-bit sRGB pixels, at the exposure of the reference. Only one PSNR is
+computed without the rounding to 8 bits, which hides some small differences and enlarges others.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..system.errors import MaterialError
 from ..system.optional import optional
 
-EXPOSURE_PERCENTILE, EXPOSED_TO = 90, 0.6
+EXPOSURE_PERCENTILE, EXPOSED_TO = 90, 0.6  # of the object's pixels, and the linear value that it is brought to
 PEAK_LUMINANCE = 100.0  # cd/m², of the display that shows the 8-bit image
 
 Pixels = NDArray[np.float32]
@@ -24,12 +24,12 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class ImageMetrics:
-    """Distances between two images at the reference's exposure. PSNRs are inf for identical images.
+    """Differences between two images at the reference's exposure. PSNRs of identical images are infinite.
 
-    psnr_object_db, psnr_frame_db: over the object's pixels, and over all; 8-bit sRGB, three channels together.
-    psnr_unrounded_db: over the object's pixels, on the sRGB curve but not rounded to 8 bits.
-    ssim: structural similarity (Wang et al. 2004), delta_e_itp: ΔE_ITP (ITU-R BT.2124) on a display of 100 cd/m²,
-    flip: ꟻLIP (Andersson et al. 2020): means over the object's pixels.
+    psnr_object_db, psnr_frame_db: over the object's pixels, and over all pixels; 8-bit sRGB, all three channels.
+    psnr_unrounded_db: over the object's pixels, on the sRGB curve, but not rounded to 8 bits.
+    ssim, delta_e_itp, flip: means over the object's pixels of structural similarity (Wang et al. 2004), of ΔE_ITP
+        (ITU-R BT.2124) on a display of 100 cd/m², and of ꟻLIP (Andersson et al. 2020).
     """
 
     psnr_object_db: float
@@ -41,9 +41,9 @@ class ImageMetrics:
 
 
 def image_metrics(reference: Pixels, candidate: Pixels, mask: Mask) -> ImageMetrics:
-    """Compares linear images of shape (height, width, 3); mask (height, width) says where the object is.
+    """Compares two images in linear RGB, (height, width, 3). mask: the pixels that show the object, (height, width).
 
-    Raises MissingDependencyError without the packages of sommerl[render].
+    Raises MissingDependencyError without the packages of sommerl[render], MaterialError as `exposure` does.
     """
     scale = exposure(reference, mask)
     a, b = to_srgb8(reference * scale), to_srgb8(candidate * scale)
@@ -59,45 +59,45 @@ def image_metrics(reference: Pixels, candidate: Pixels, mask: Mask) -> ImageMetr
 
 
 def exposure(reference: Pixels, mask: Mask) -> float:
-    """The factor that brings the 90th percentile of the object's pixels' mean channel to 0.6.
+    """The factor that scales the 90th percentile of the object's pixels, in the mean of the channels, to 0.6.
 
-    Raises MaterialError for an object that is black, or whose level is not finite.
+    Raises MaterialError if the object is black, or if that percentile is not finite.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # of infinite pixels
         level = float(np.percentile(reference[mask].mean(axis=-1), EXPOSURE_PERCENTILE)) if mask.any() else 0.0
     if not np.isfinite(level):
-        raise MaterialError("exposure: expected radiance that single precision can hold, found larger numbers or none")
+        raise MaterialError("exposure: the object's radiance is too large for single precision, or not a number")
     if not level > 0:
-        raise MaterialError("exposure: expected an object that reflects light, found a black one")
+        raise MaterialError("exposure: the object is black, so no exposure can be taken from it")
     return EXPOSED_TO / level
 
 
 def to_srgb(linear: Pixels) -> Pixels:
-    """Linear RGB, clipped to [0, 1], on the curve of sRGB (IEC 61966-2-1), in [0, 1]."""
+    """Applies the curve of sRGB (IEC 61966-2-1) to linear RGB, clipped to [0, 1]; results are in [0, 1]."""
     x = np.clip(linear, 0, 1)
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
 
 
 def to_srgb8(linear: Pixels) -> NDArray[np.uint8]:
-    """Linear RGB, clipped to [0, 1], as 8-bit sRGB."""
+    """Converts linear RGB, clipped to [0, 1], to 8-bit sRGB."""
     return np.round(255 * to_srgb(linear)).astype(np.uint8)
 
 
 def psnr(a: NDArray[Any], b: NDArray[Any], peak: float = 255.0) -> float:
-    """Peak signal-to-noise ratio [dB] of values in [0, peak]; 8-bit ones by default."""
+    """Peak signal-to-noise ratio [dB] of two arrays of values in [0, peak]; infinite if they are equal."""
     mse = float(np.mean((a.astype(np.float64) - b) ** 2))
     return 10 * np.log10(peak**2 / mse).item() if mse > 0 else float("inf")
 
 
 def ssim(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: Mask) -> float:
-    """Mean structural similarity over the mask."""
+    """Mean structural similarity (Wang et al. 2004) over the mask."""
     kept = optional("skimage.metrics", "scikit-image", "image metrics", "render")
     _, similarity = kept.structural_similarity(a, b, channel_axis=-1, data_range=255, full=True)
     return float(similarity[mask].mean())
 
 
 def delta_e_itp(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: Mask) -> float:
-    """Mean ΔE_ITP over the mask."""
+    """Mean ΔE_ITP (ITU-R BT.2124) over the mask."""
     kept = optional("colour", "colour-science", "image metrics", "render")
 
     def ictcp(image: NDArray[np.uint8]) -> Any:
@@ -110,12 +110,12 @@ def delta_e_itp(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: Mask) -> float
 
 
 def flip(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: Mask) -> float:
-    """Mean ꟻLIP over the mask, at the tool's default viewing distance (67 pixels per degree)."""
+    """Mean ꟻLIP (Andersson et al. 2020) over the mask, at the tool's default of 67 pixels per degree."""
     return float(_flip(a, b, False)[..., 0][mask].mean())
 
 
 def flip_map(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """ꟻLIP of each pixel, in its authors' colours (magma: black for none, white for 1), as 8-bit pixels."""
+    """A picture of each pixel's ꟻLIP in its authors' colours (magma: black for 0, white for 1), in 8 bits."""
     return np.round(255 * _flip(a, b, True)).astype(np.uint8)
 
 

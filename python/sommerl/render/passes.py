@@ -1,4 +1,4 @@
-"""Rendering in passes: bounded memory, progress, and long renders that go on where they were stopped."""
+"""Renders in passes, which bounds memory, shows progress, and lets a long render be stopped and resumed."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from numpy.typing import NDArray
 
 from .. import __version__
 from ..system import jit
-from ..system.interrupt import undisturbed
+from ..system.interrupt import hold_interrupts
 from .checkpoint import Checkpoint, State
 from .frame import Image, Scene
 from .llvm import drjit, mitsuba
 
-LARGEST_SIZE = 2048  # a pass of one sample a pixel then still fits into 1 GB
-SAMPLES_A_PASS = 2**22  # or one a pixel: bounds memory, and Mitsuba crashes beyond 2^32
-MOST_A_PIXEL = 2**12  # in a pass; from 2^16 on, threads share pixels, and sums depend on their order
+LARGEST_SIZE = 2048  # pixels: one pass with one sample a pixel then fits into 1 GB of memory
+SAMPLES_A_PASS = 2**22  # at most, if that is at least one a pixel: bounds memory; Mitsuba crashes beyond 2^32
+MOST_A_PIXEL = 2**12  # samples in a pass; from 2^16 on, threads share pixels, and sums depend on the threads' order
 DEFAULT_SIZE, DEFAULT_SPP = 256, 256
 
 Progress = Callable[[int, int], None]  #: passes done, passes in all
 
 
 def render(scene: Scene, *, spp: int = DEFAULT_SPP, seed: int = 0, progress: Progress | None = None) -> Image:
-    """Renders a scene in passes of bounded size. The same scene, spp and seed give the same pixels on one machine."""
+    """Renders a scene. The same scene, spp (samples a pixel) and seed give the same pixels on one machine."""
     return render_all([lambda: scene], spp=spp, seed=seed, progress=progress)[0]
 
 
@@ -35,18 +35,19 @@ def render_all(
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> list[Image]:
-    """Renders several scenes as `render` does, each with the same seed, hence alike scenes with the same directions.
+    """Renders several scenes as `render` does, all with the same seed, so that similar scenes get the same directions.
 
-    scenes: functions that make them; each is called when its turn comes, so that not all have to fit into memory.
-    checkpoint: is read first, so that a render which was stopped goes on, with the same pixels as if it had not been;
-    is written every few seconds and when Python is interrupted; and is left for the caller to remove.
+    scenes: functions that make them. Each is called just before its scene is rendered, so that only one scene is in
+        memory at a time.
+    checkpoint: if it holds a state of this render, the render is resumed, and gives the same pixels as if it had never
+        been stopped. It is written every few seconds, and on KeyboardInterrupt. The caller removes it.
     """
     mi = mitsuba()
     count = len(_passes(spp, checkpoint.pixels)) if checkpoint else 0
     state = checkpoint.load(_identity(spp, seed), len(scenes), count) if checkpoint else State()
     try:
         for make in scenes[len(state.images) :]:
-            with undisturbed():
+            with hold_interrupts():
                 scene = make()
             width, height = (int(n) for n in scene.mitsuba.sensors()[0].film().size())
             passes = _passes(spp, width * height)
@@ -60,7 +61,7 @@ def render_all(
                 if progress:
                     progress(before + state.passes, of_all)
             assert state.total is not None
-            with undisturbed():
+            with hold_interrupts():
                 image = Image((state.total / spp).astype(np.float32), _mask(scene, width, height))
                 state = State((*state.images, image))
     except KeyboardInterrupt:
@@ -79,9 +80,9 @@ def sum_of_passes(
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> NDArray[np.float64]:
-    """The sum of what `one(samples a pixel, seed)` gives for each pass of an image of so many pixels.
+    """The sum of the results of `one(samples a pixel, seed)` over all passes of an image.
 
-    It is resumed as `render_all` is.
+    pixels: their number, which decides how many passes there are. checkpoint: as in `render_all`.
     """
     passes = _passes(spp, pixels)
     state = checkpoint.load(_identity(spp, seed), 1, len(passes)) if checkpoint else State()
@@ -99,7 +100,7 @@ def sum_of_passes(
 
 
 def _identity(spp: int, seed: int) -> dict[str, str]:
-    """What decides the pixels of every render."""
+    """What the pixels of every render depend on, for the identity of its checkpoint."""
     mi = mitsuba()
     identity = {"spp": str(spp), "seed": str(seed), "variant": mi.variant(), "size of passes": str(SAMPLES_A_PASS)}
     return identity | {"version of Sommerl": __version__, "version of Mitsuba": mi.__version__}
@@ -112,13 +113,13 @@ def _after_each(
     one: Callable[[int, int], NDArray[np.float64]],
     checkpoint: Checkpoint | None,
 ) -> Iterator[State]:
-    """The state that a render has reached: where it goes on from, if that is not the beginning, and after each pass."""
+    """Yields the state of a render after each pass; first the state that it is resumed from, if it is."""
     if state.passes:
         yield state
     for number in range(state.passes, len(passes)):
-        with undisturbed(), jit.limited():
+        with hold_interrupts(), jit.limited():
             total = one(passes[number], _seed(seed, number))
-        # Not reached after an interruption: of the pass that it came in, Mitsuba may have left out a part.
+        # After an interruption, this line is not reached: Mitsuba may not have finished the pass.
         state = State(state.images, total if state.total is None else state.total + total, number + 1)
         if checkpoint:
             checkpoint.save(state)
@@ -126,10 +127,10 @@ def _after_each(
 
 
 def _passes(spp: int, pixels: int) -> list[int]:
-    """How many samples a pixel each pass takes: a power of two, so that no two threads share a pixel.
+    """The samples a pixel of each pass: powers of two, so that no two threads share a pixel.
 
-    Dr.Jit gives each thread a row of samples whose length is a power of two. Where a row ends among a pixel's samples,
-    two threads add to that pixel, and its sum is rounded by the order in which they come.
+    Dr.Jit gives each thread a block of samples whose length is a power of two. If a block ended within the samples of a
+    pixel, two threads would add to that pixel, and the rounding of its sum would depend on which comes first.
     """
     most = max(1, min(MOST_A_PIXEL, SAMPLES_A_PASS // pixels))
     most = 1 << most.bit_length() - 1
@@ -137,12 +138,12 @@ def _passes(spp: int, pixels: int) -> list[int]:
 
 
 def _seed(seed: int, number: int) -> int:
-    """A seed of 32 bits for one pass: different for every pass of every seed, as far as 32 bits go."""
+    """A 32-bit seed for one pass, different (as far as 32 bits allow) for each pass of each seed."""
     return int(np.random.SeedSequence([seed, number]).generate_state(1)[0])
 
 
 def _mask(scene: Scene, width: int, height: int) -> NDArray[np.bool_]:
-    """Which pixels show an object at their centre."""
+    """The pixels that show an object at their centre, (height, width)."""
     mi, dr = mitsuba(), drjit()
     sensor = scene.mitsuba.sensors()[0]
     objects = [shape for shape in scene.mitsuba.shapes() if shape.id() in scene.objects]

@@ -1,1 +1,1 @@
-"""The paper's tables and figures, made again from any data."""
+"""Reproduces the paper's tables and figures (Kurt & Cinsdikici 2008) from any data."""

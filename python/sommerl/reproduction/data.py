@@ -1,4 +1,4 @@
-"""Where the paper's materials come from, and what the paper says of them."""
+"""Finds the paper's materials, and the numbers that the paper prints for them."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from ..system.errors import FormatError
 
 
 def expected(item: str) -> dict[str, Any]:
-    """What the paper prints for a table or a figure: see expected.toml."""
+    """The numbers that the paper prints, from expected.toml. item: "table1", "fig5" or "fig6"."""
     text = resources.files("sommerl.reproduction").joinpath("expected.toml").read_text("utf-8")
     return tomllib.loads(text)[item]
 
 
 def material(data: Path | None, name: str) -> BrdfTable:
-    """A material as a table, interpolated.
+    """A material as a table with trilinear lookup.
 
-    data: a folder with a file of that name in any known format, an archive of materials, or None for the built-in
-    stand-ins. Raises FormatError if there is none.
+    data: a folder that holds a file of that name in any known format, or an archive of materials (.npz); None for the
+    built-in stand-ins. Raises FormatError if there is no such file.
     """
     if data is None:
         source = name
@@ -34,11 +34,11 @@ def material(data: Path | None, name: str) -> BrdfTable:
     else:
         found = [path for extension in EXTENSIONS if (path := data / f"{name}{extension}").is_file()]
         if not found:
-            raise FormatError(f"{data}: expected a file {name} with one of {', '.join(EXTENSIONS)}, found none")
+            raise FormatError(f"{data}: there is no file {name} in it that ends in one of {', '.join(EXTENSIONS)}")
         source = str(found[0])
     return load_table(source)
 
 
 def compressed(table: BrdfTable, clusters: int, epochs: int = 30) -> SomManBrdf:
-    """By the paper's method; looked up by the nearest cell."""
+    """The table, compressed with the preset `paper` and nearest lookup."""
     return train(table, TrainOptions(clusters=clusters, epochs=epochs))[0]

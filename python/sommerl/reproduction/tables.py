@@ -1,9 +1,9 @@
 """Table 1, Fig. 5 and Fig. 6: analytic models against measured data and against the paper's representation.
 
-Each function gives rows, one a figure that the paper prints, with that figure, and writes a picture where the paper has
-one. The loss is that of Ngan, Durand & Matusik 2005, whose objective the paper says it uses; docs/method.md tells what
-speaks for that. Models are fitted to interpolated tables, since none has the steps of nearest cells; pictures of tables
-are looked up by the nearest cell, as the paper's. PSNRs over the whole frame are those to be compared with the paper's.
+Each function returns rows, one for each number that the paper prints, with that number beside ours; where the paper has
+a picture, it writes one. The loss is that of Ngan, Durand & Matusik 2005, which the paper says it uses; docs/method.md
+discusses the evidence for that. Models are fitted to tables with trilinear lookup, since they cannot follow the steps
+between cells. Rendered tables have nearest lookup, as in the paper. Compare the paper's PSNRs with ours over the frame.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ Progress = Callable[[int, int], None]  #: steps done, steps in all
 
 @dataclass(frozen=True)
 class FitRow:
-    """The errors of a fit to the table and of one to the compressed table, each against what it was fitted to: ours,
-    and the paper's."""
+    """The error of a fit to the table, and of a fit to its compressed form (`_som_man`): ours and the paper's. Each is
+    measured against what the model was fitted to."""
 
     material: str
     model: str
@@ -39,8 +39,8 @@ class FitRow:
 
 @dataclass(frozen=True)
 class ImageRow:
-    """A PSNR [dB] against the table, over the frame and over the object: ours, and the paper's, over what it calls the
-    image."""
+    """The PSNR [dB] of a rendering against that of the table: ours over the frame and over the object, and the paper's,
+    which is over "the image"."""
 
     model: str
     psnr_frame_db: float
@@ -51,7 +51,7 @@ class ImageRow:
 def table1(
     data: Path | None = None, options: FitOptions | None = None, *, progress: Progress | None = None
 ) -> list[FitRow]:
-    """Two-lobe fits to four materials, and to their compressed form of M = 1000."""
+    """Table 1: two-lobe fits to four materials, and to their compressed forms with M = 1000."""
     rows: list[FitRow] = []
     printed = expected("table1")
     for number, (name, values) in enumerate(printed.items()):
@@ -68,7 +68,7 @@ def figure5(
     *,
     progress: Progress | None = None,
 ) -> list[ImageRow]:
-    """A sphere of blue-metallic-paint: compressed, M = 256, and eight two-lobe fits to the table."""
+    """Fig. 5: spheres of blue-metallic-paint, compressed with M = 256, and of eight two-lobe fits to the table."""
     printed = expected("fig5")
     table = material(data, "blue-metallic-paint")
     models = [name for name in printed if name != "som-man"]
@@ -90,8 +90,8 @@ def figure6(
     *,
     progress: Progress | None = None,
 ) -> list[FitRow]:
-    """Green-metallic-paint: three-lobe fits to the table and to its compressed form of M = 1000. The picture compares
-    all with the table."""
+    """Fig. 6: three-lobe fits to green-metallic-paint, and to its compressed form with M = 1000. The picture compares
+    all of them with the table."""
     options = replace(options or FitOptions(), lobes=3)
     table, ours = _both(data, "green-metallic-paint")
     fitted = _fitted(table, ours, expected("fig6"), options, _part(progress, 0, 2))
@@ -104,7 +104,7 @@ def figure6(
 
 
 def _both(data: Path | None, name: str) -> tuple[BrdfTable, SomManBrdf]:
-    """A material, by its plain name, and its compressed form of M = 1000."""
+    """A material, without "stand-in" in its name, and its compressed form with M = 1000."""
     table = material(data, name)
     table.name = name
     return table, compressed(table, 1000)
@@ -117,7 +117,7 @@ def _fitted(
     options: FitOptions,
     progress: Progress | None,
 ) -> list[tuple[Fit, Fit, FitRow]]:
-    """The models that the paper prints for a material: fitted to the table, and to its compressed form."""
+    """Fits the models that the paper has for a material to its table, and to its compressed form."""
     to_table, to_ours = (
         fit_models(brdf, list(printed), options, progress=_part(progress, number, 2))
         for number, brdf in enumerate((table, ours.with_interpolation("trilinear")))
@@ -131,7 +131,7 @@ def _fitted(
 def _compared(
     table: BrdfTable, shown: Sequence[tuple[str, Brdf]], picture: Path | None, progress: Progress | None
 ) -> list[Comparison]:
-    """Materials under titles, compared with the table on a sphere."""
+    """Compares materials, given with titles, with the table on a sphere; writes a picture if a path is given."""
     reference, materials = table.with_interpolation("nearest"), [brdf for _, brdf in shown]
     comparisons = compare_on_sphere(reference, materials, default_environment(), progress=progress)
     if picture:
@@ -140,7 +140,7 @@ def _compared(
 
 
 def _part(progress: Progress | None, number: int, parts: int) -> Progress | None:
-    """What a part of the work, of equal ones, reports its progress to."""
+    """The progress function for one of several equal parts of the work."""
     if progress is None:
         return None
     return lambda done, total: progress(number * total + done, parts * total)

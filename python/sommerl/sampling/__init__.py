@@ -1,1 +1,1 @@
-"""Importance samplers: each draws a direction to the light for a direction to the viewer, and gives its density."""
+"""Importance samplers: they draw directions to the light for a direction to the viewer, and give their density."""

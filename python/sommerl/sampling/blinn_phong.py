@@ -1,4 +1,4 @@
-"""The paper's sampler: half vectors from the lobe of Blinn and Phong."""
+"""The paper's sampler: half vectors from a Blinn-Phong lobe."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SHARPEST = 1e4  # exponents beyond this lose their digits in single precision
 
 @dataclass(frozen=True)
 class BlinnPhongSampler(Sampler):
-    """Cosine-weighted directions mixed with those of half vectors from Blinn-Phong's lobe: the paper's sampler (§6).
+    """A mixture of cosine-weighted directions and of half vectors from a Blinn-Phong lobe: the paper's sampler (§6).
 
     exponent: n of the density (n + 1) / 2π · cosⁿ θ_h of half vectors.
     specular: the probability of drawing from that lobe and not from the cosine.
@@ -32,13 +32,16 @@ class BlinnPhongSampler(Sampler):
 
     @classmethod
     def fitted(cls, brdf: Brdf) -> BlinnPhongSampler:
-        """The sampler whose lobe holds half of the highlight's light within the angle that the material's does."""
+        """The sampler whose lobe has half of its light within the same θ_h as the material's highlight.
+
+        The highlight is measured across the plane of incidence at θ_d = 22.5° (docs/method.md, *Sampling*).
+        """
         theta_h = np.linspace(0.0, 1.4, 1401) ** 2 / 1.4
         wi, wo = directions(theta_h, np.full_like(theta_h, PI / 8), np.full_like(theta_h, PI / 2))
         f_r = brdf.eval(np.stack(wi, -1), np.stack(wo, -1)).mean(axis=-1)
         base = f_r.min()
         light = (f_r - base) * np.sin(2 * theta_h) * np.gradient(theta_h)
-        if light.sum() <= 1e-6 * base:  # no highlight: what looks like one is rounding
+        if light.sum() <= 1e-6 * base:  # only rounding errors: there is no highlight
             return cls(brdf, 1.0, 0.1)
         half = theta_h[np.searchsorted(np.cumsum(light), light.sum() / 2)]
         exponent = min(SHARPEST, max(1.0, math.log(0.5) / math.log(math.cos(max(half, 1e-3))) - 1))
@@ -74,6 +77,6 @@ class BlinnPhongSampler(Sampler):
         length = f.where(above, length, 1.0)
         cos_h = f.where(above, h[2], 1.0) / length
         lobe = (exponent + 1.0) / TWO_PI * f.power(cos_h, exponent)
-        # dω_h = dω_i / (4 cos θ_d), and cos θ_d = |ω_i + ω_o| / 2, which no rounding makes negative.
+        # dω_h = dω_i / (4 cos θ_d), with cos θ_d = |ω_i + ω_o| / 2, which cannot become negative by rounding.
         glossy = lobe / (2.0 * length)
         return f.where(above, specular * glossy + (1.0 - specular) * (wi[2] / PI), 0.0)

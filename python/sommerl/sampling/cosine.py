@@ -1,4 +1,4 @@
-"""Cosine-weighted directions: the sampler that knows nothing of the material."""
+"""Cosine-weighted directions: the sampler that does not depend on the material."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .sampler import PI, Sampler
 
 @dataclass(frozen=True)
 class CosineSampler(Sampler):
-    """Directions of density cos θ_i / π."""
+    """Draws directions with the density cos θ_i / π."""
 
     brdf: Brdf
     name = "cosine"

@@ -1,18 +1,19 @@
 """Our sampler: half vectors from a small table for each elevation of the viewer.
 
-For a viewer at elevation θ_o, half vectors whose light lies above the horizon fill 0 ≤ θ_h ≤ θ_max(φ_h, θ_o), where φ_h
-is the azimuth from the viewer's. A unit square is stretched over them. One side is s, with
+For a viewer at elevation θ_o, the half vectors that reflect to a light above the horizon are those with
+0 ≤ θ_h ≤ θ_max(φ_h, θ_o), where φ_h is the azimuth from the viewer's. They are parametrised by a unit square. One
+coordinate is s, with
 
     sin θ_h = s⁴ sin θ_max,
 
-so that a row of cells costs about as much light as the next whether the material is chrome or chalk. The other is the
-place c of φ_h on the rim of a diamond, |x| + |y| = 1 with x = 1 - c, which needs no trigonometry. Every cell of that
-square has the probability that the table gives it and is drawn from uniformly; nothing is drawn below the horizon, and
-nothing above it is left out. Between two elevations of the table their densities are mixed: one of the two is chosen at
-random, then a cell by Walker's alias method.
+so that rows of cells get about equal amounts of light, whether the material is chrome or chalk. The other is c, the
+place of φ_h on the edge of a diamond, |x| + |y| = 1 with x = 1 - c, which needs no trigonometry. The square is divided
+into cells. A cell is drawn with the probability that the table gives, and then a point in it uniformly. So no direction
+below the horizon is drawn, and every direction above it can be. Between two elevations of the table, one of the two is
+chosen at random, so that the density is a mixture of both; its cell is then found by Walker's alias method.
 
 Tables of directions for each elevation go back to Matusik (2003), half vectors from tabulated distributions to Dupuy et
-al. (2015), the domain that follows the horizon to the visible normals of Dupuy and Jakob (2018).
+al. (2015), and a domain that follows the horizon to the visible normals of Dupuy and Jakob (2018).
 """
 
 from __future__ import annotations
@@ -28,30 +29,30 @@ from ..reflectance.arrays import Array, Triple, gather3, ops
 from ..reflectance.brdf import Brdf, Buffers
 from .sampler import PI, Sampler
 
-ROWS, COLUMNS = 20, 8  # cells in s and, on one side of the plane of the viewer, in c
-ELEVATIONS = 12  # of the viewer; dense at grazing angles, where lobes change fastest
+ROWS, COLUMNS = 20, 8  # cells in s, and in c on one side of the viewer's plane
+ELEVATIONS = 12  # of the viewer; closer together at grazing angles, where lobes change fastest
 CELLS = ROWS * COLUMNS
 SLOTS = 256  # of a cell in the alias table
 SLOT_BITS = 8
-WHOLE = CELLS * SLOTS  # the probability 1
+WHOLE = CELLS * SLOTS  # what stands for the probability 1
 
-SMALLEST = 1e-35  # solid angle of a direction that is drawn, times its density in the unit square
+SMALLEST = 1e-35  # a direction with a smaller solid angle per area of the unit square is not drawn
 TINY = 1e-9  # added to lengths along x, so that the azimuth of the normal itself is defined
-LOWEST = 1e-4  # cos θ_o of the table's lowest elevation, 0 but for numbers that need some width
+LOWEST = 1e-4  # cos θ_o of the table's lowest elevation, which would be 0 if that did not make solid angles 0
 DIFFUSE = 0.01  # share of directions that follow the cosine
-FINER = 3  # places looked at along each side of a cell
+FINER = 3  # points along each side of a cell at which the BRDF is evaluated
 EXACT = 16  # the same for a single albedo: within 0.1 % where a cell holds no jump
-VIEWERS = 31  # elevations that albedos are tabulated for, equal in θ_o
-NEIGHBOUR = 0.07  # a cell gets at least that share of the brightest light in and about it, which bounds weights
+VIEWERS = 31  # elevations for which albedos are tabulated, at equal steps of θ_o
+NEIGHBOUR = 0.07  # a cell gets at least this share of the brightest light in and next to it, which bounds weights
 
 
 @dataclass(frozen=True)
 class HalfVectorSampler(Sampler):
-    """Half vectors from a table for each elevation of the viewer.
+    """Draws half vectors from a table for each elevation of the viewer.
 
-    table: of each cell, in 32 bits from the lowest: its probability in units of 1 / WHOLE (16), another cell (8), and
-        how many of its own SLOTS that one takes (8); shape (ELEVATIONS, CELLS). A cell's number is
-        column + COLUMNS · row.
+    table: (ELEVATIONS, CELLS), for each cell 32 bits, from the lowest: its probability in units of 1 / WHOLE (16 bits);
+        for the alias method, the number of another cell (8 bits), and how many of this cell's SLOTS that one gets
+        (8 bits). The number of a cell is column + COLUMNS · row.
     """
 
     brdf: Brdf
@@ -60,7 +61,7 @@ class HalfVectorSampler(Sampler):
 
     @classmethod
     def fitted(cls, brdf: Brdf) -> HalfVectorSampler:
-        """The sampler of a BRDF, which is evaluated for about 33,000 pairs of directions."""
+        """A sampler for a BRDF, which is evaluated for about 33,000 pairs of directions."""
         return cls(brdf, np.stack([_alias_table(p) for p in _probabilities(brdf)]))
 
     def buffers(self) -> dict[str, NDArray[Any]]:
@@ -80,18 +81,18 @@ class HalfVectorSampler(Sampler):
         s = ((cell // COLUMNS) + u[1]) * (1.0 / ROWS)
         c = ((cell % COLUMNS) + abs(side)) * (2.0 / COLUMNS)
         wi, solid_angle = _mirrored(s, c, side, wo)
-        # Half vectors next to the normal have densities beyond single precision, and weigh nothing.
+        # Next to the normal, densities are too large for single precision; what is lost there is negligible.
         drawn = (wo[2] > 0.0) & (wi[2] > 0.0) & (solid_angle > SMALLEST)
         return wi, f.where(drawn, _share(table, first, t, cell) / f.where(drawn, solid_angle, 1.0), 0.0)
 
     def density(self, wi: Triple, wo: Triple, buffers: Buffers) -> Array:
         f = ops(wi[0])
         above = (wi[2] > 0.0) & (wo[2] > 0.0)
-        # The viewer, raised as in `_mirrored`, and the half vector. Their lengths along the surface need not be known.
+        # The viewer, raised as in `_mirrored`, and the half vector. Neither has to be normalised.
         x, y, z = wo[0] + TINY, wo[1], f.maximum(wo[2], LOWEST)
         hx, hy, hz = (wi[0] + wo[0]) + TINY, wi[1] + wo[1], f.where(above, wi[2] + z, 1.0)
         along, across = hx * x + hy * y, hx * y - hy * x
-        # In single precision, these lengths can be 0, and products of all of them, too.
+        # In single precision, these lengths and their products can be 0.
         flat = f.maximum(hx * hx + hy * hy, TINY * TINY)
         extent = _extent(along, z * z * flat)
         s = f.sqrt(f.sqrt(f.sqrt(f.minimum(flat / ((flat + hz * hz) * extent), 1.0))))
@@ -101,16 +102,19 @@ class HalfVectorSampler(Sampler):
         column = f.bin(c * (COLUMNS / 2), COLUMNS)
         first, t = _elevation(wo[2])
         share = _share(buffers["table"], first, t, column + COLUMNS * row)
-        # As in `_mirrored`, with the lengths that cancel left out.
+        # As in `_mirrored`, without the lengths, which cancel.
         pdf = share * (s * hz) * ((x * x + y * y) * (rim * rim) * (1.0 / 32))
         return f.where(above, pdf, 0.0)
 
     def albedo(self, theta: ArrayLike) -> NDArray[np.float64]:
-        """The albedo, as `Brdf.albedo` says, from EXACT² places in each cell on either side of the viewer's plane."""
+        """The albedo as `Brdf.albedo` defines it, from EXACT² points in each cell on both sides of the viewer's plane.
+
+        theta: the viewer's polar angles [rad], (...). Returns (..., 3). Raises ValueError for angles outside [0, π/2].
+        """
         angles = np.asarray(theta, np.float64)
         known = np.isfinite(angles)
         if ((angles < 0) | (angles > PI / 2)).any():
-            raise ValueError("albedo: expected polar angles from 0 to π/2, found others")
+            raise ValueError("albedo: polar angles have to be from 0 to π/2, and some are not")
         found = np.full((angles.size, 3), np.nan)
         for number in np.flatnonzero(known):
             cos_o = np.cos(angles.reshape(-1)[number : number + 1])
@@ -120,17 +124,18 @@ class HalfVectorSampler(Sampler):
 
 
 def albedos(brdf: Brdf) -> NDArray[np.float64]:
-    """The share of even light that a BRDF reflects to viewers at VIEWERS elevations, (VIEWERS, 3): see `albedo_at`.
+    """The albedo of a BRDF for viewers at VIEWERS elevations, (VIEWERS, 3): of uniform light, the share that is
+    reflected to the viewer.
 
-    It is evaluated for about 20,000 pairs of directions.
+    The BRDF is evaluated for about 20,000 pairs of directions. See `albedo_at`.
     """
-    # At the normal itself, and on the horizon, data may be of another kind than right beside.
+    # Not exactly at the normal and the horizon, where measured data may differ from what is right beside.
     theta = np.clip(np.arange(VIEWERS) / (VIEWERS - 1) * PI / 2, 0.01, PI / 2 - 0.01)
     return _light(brdf, np.cos(theta), 2)[0].mean(axis=(1, 2, 3))
 
 
 def albedo_at(cos_o: Array, table: Any) -> Triple:
-    """The albedo for viewers at that cosine: interpolated in θ_o from a table of `albedos`, flat."""
+    """The albedo for viewers at cos θ_o, interpolated in θ_o. table: from `albedos`, flat."""
     f = ops(cos_o)
     sin = f.sqrt(f.maximum(1.0 - cos_o * cos_o, 0.0))
     x = f.atan2(sin, cos_o) * (2 / PI * (VIEWERS - 1))
@@ -142,7 +147,10 @@ def albedo_at(cos_o: Array, table: Any) -> Triple:
 
 
 def _elevation(cos_o: Array) -> tuple[Array, Array]:
-    """Of two neighbouring elevations of the table, where the first one's cells begin, and the second one's share."""
+    """The two elevations of the table that a viewer lies between.
+
+    Returns the number of the first cell of the lower one, and the share of the other one, from 0 to 1.
+    """
     f = ops(cos_o)
     x = f.sqrt(f.maximum(cos_o, 0.0)) * (ELEVATIONS - 1)
     node = f.bin(x, ELEVATIONS - 1)
@@ -150,18 +158,18 @@ def _elevation(cos_o: Array) -> tuple[Array, Array]:
 
 
 def _share(table: Any, first: Array, t: Array, cell: Array) -> Array:
-    """The density in a cell of the unit square."""
+    """The density in a cell of the unit square, mixed from two elevations. first, t: from `_elevation`."""
     gather = ops(t).gather
     here, next_ = (1.0 * (gather(table, first + offset + cell) & 0xFFFF) for offset in (0, CELLS))
     return (here + t * (next_ - here)) * (1.0 / SLOTS)
 
 
 def _extent(along: Array, upright2: Array) -> Array:
-    """sin² θ_max of half vectors in a plane through the normal.
+    """sin² θ_max for half vectors in a plane through the normal.
 
-    In that plane the viewer's direction has the components `along` the surface and `upright`, whose square is given, in
-    any one unit: at the angle δ = atan2(along, upright) from the normal. Light is on the horizon where
-    2 θ_h - δ = π/2, so that sin² θ_max = (1 + sin δ) / 2.
+    along, upright2: of the viewer's direction, projected into that plane and in any unit of length, the component along
+    the surface, and the square of the one along the normal, so that it is at δ = atan2(along, √upright2) from the
+    normal. The light is on the horizon where 2 θ_h - δ = π/2, so sin² θ_max = (1 + sin δ) / 2.
     """
     f = ops(along)
     r = f.sqrt(along * along + upright2)
@@ -170,9 +178,9 @@ def _extent(along: Array, upright2: Array) -> Array:
 
 
 def _mirrored(s: Array, c: Array, side: Array, wo: Triple) -> tuple[Triple, Array]:
-    """The direction to the light at a place of the unit square, and the solid angle of the whole square at its scale.
+    """The direction to the light for a point (s, c) of the unit square, and the solid angle per area of the square.
 
-    side: its sign tells the side of the plane of the viewer.
+    side: its sign selects the side of the viewer's plane.
     dω_i = 4 (h·ω_o) dω_h, dω_h = d(sin² θ_h) dφ_h / (2 cos θ_h), dφ_h = dc / (x² + y²).
     """
     f = ops(s)
@@ -198,8 +206,12 @@ def _mirrored(s: Array, c: Array, side: Array, wo: Triple) -> tuple[Triple, Arra
 def _light(
     brdf: Brdf, cos_o: NDArray[np.float64], finer: int, side: float = 1.0
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The light f_r cos θ_i dω_i of places in the unit square, finer² in each cell, and cos θ_i dω_i alone; of shape
-    (elevations, ROWS, COLUMNS, places, channels) and without channels. side: of the plane of the viewer, 1 or -1."""
+    """The light f_r cos θ_i dω_i at finer² points in each cell of the unit square, for viewers at cos θ_o; and
+    cos θ_i dω_i alone.
+
+    Their shapes are (elevations, ROWS, COLUMNS, points, channels), and the same without channels. side: of the viewer's
+    plane, 1 or -1.
+    """
     s, c = (((np.arange(finer * n) + 0.5) / (finer * n)) for n in (ROWS, COLUMNS))
     z, s, c = np.broadcast_arrays(cos_o[:, None, None], s[:, None], 2 * c)
     wo = np.sqrt(1 - z * z), np.zeros_like(z), z
@@ -215,11 +227,12 @@ def _light(
 
 
 def _probabilities(brdf: Brdf) -> NDArray[np.float64]:
-    """Of every cell, (ELEVATIONS, CELLS), each row with the sum 1.
+    """The probabilities of the cells, (ELEVATIONS, CELLS), which add up to 1 for each elevation.
 
-    A cell's root mean square of light makes the variance of the albedo least; what it gets beyond that bounds weights.
+    In proportion to the root mean square of the light in a cell, they would minimise the variance of the albedo. They
+    are raised where the brightest light near a cell asks for it (NEIGHBOUR), which bounds the weights of samples.
     """
-    # Each table serves the elevations about it, so that those between are looked at, too.
+    # A table is also used for elevations between its own and the next, so these are evaluated, too.
     between = 2 * ELEVATIONS - 1
     light, cosine = _light(brdf, np.maximum((np.arange(between) / (between - 1)) ** 2, LOWEST), FINER)
     rms = np.sqrt((light * light).mean(axis=(-2, -1)))
@@ -232,19 +245,22 @@ def _probabilities(brdf: Brdf) -> NDArray[np.float64]:
     even: NDArray[np.float64] = cosine[::2].mean(axis=-1)
     total = bounded.sum(axis=(1, 2), keepdims=True)
     even /= even.sum(axis=(1, 2), keepdims=True)
-    glossy = np.where(total > 0, bounded / _positive(total), even)  # an elevation may see no light at all
+    glossy = np.where(
+        total > 0, bounded / _positive(total), even
+    )  # where a viewer gets no light at all, the cosine alone
     return ((1 - DIFFUSE) * glossy + DIFFUSE * even).reshape(ELEVATIONS, CELLS)
 
 
 def _positive(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Divisors, 1 where there is no light."""
+    """The values as divisors: 1 in the place of 0."""
     return np.where(values > 0, values, 1.0)
 
 
 def _alias_table(p: NDArray[np.float64]) -> NDArray[np.uint32]:
-    """The words of one elevation, (CELLS): see `HalfVectorSampler.table`. Every cell has at least 1 / WHOLE.
+    """The table of one elevation, (CELLS), for probabilities p (CELLS): see `HalfVectorSampler.table`.
 
-    Vose's construction, in whole slots: what is drawn is exactly what the words say.
+    This is Vose's construction in whole slots, so that cells are drawn with exactly the probabilities that are stored.
+    Every cell has at least the probability 1 / WHOLE.
     """
     exact = p * (WHOLE - CELLS)
     units = 1 + np.floor(exact).astype(np.int64)

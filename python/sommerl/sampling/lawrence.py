@@ -1,11 +1,11 @@
 """The sampler of a factored BRDF: Lawrence, Rusinkiewicz & Ramamoorthi 2004.
 
-A lobe and one of its terms are drawn by what F(θ_o) gives them, then θ_h from that term's u and φ_h from its v, whose
-values are taken for constant over their intervals; the viewer's direction is mirrored about that half vector. Any other
-BRDF is factored first.
+First a lobe and one of its terms are drawn, with probabilities that depend on F(θ_o). Then θ_h is drawn from the term's
+u and φ_h from its v, which are taken to be constant over their intervals. The viewer's direction, mirrored about that
+half vector, is the direction to the light. A BRDF that is not factored is factored first.
 
-A small share follows the cosine, which is our own: factors may be 0 where the material is not. Half vectors that
-mirror the viewer below the horizon are drawn in vain, as in the paper.
+Our addition: a small share of directions follows the cosine, since factors may be 0 where the material is not. As in
+their paper, half vectors that mirror the viewer below the horizon are drawn, but give no light.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ from ..reflectance.half_diff import TWO_PI
 from .sampler import PI, Sampler
 from .tables import cumulative, inverted
 
-FEW = FactorOptions(4, 2)  # for sampling alone: more terms bring less, at equal time, than they cost
-DIFFUSE = 0.01  # share of directions that follow the cosine, as in ours
+FEW = FactorOptions(4, 2)  # for sampling alone: more terms cost more time than they save (docs/method.md)
+DIFFUSE = 0.01  # share of directions that follow the cosine, as in `half_vector`
 
 
 @dataclass(frozen=True)
 class LawrenceSampler(Sampler):
-    """Half vectors from the terms of a factored BRDF.
+    """Draws half vectors from the terms of a factored BRDF. A term's probability is its lobe's share times its mass.
 
-    share: of each lobe for each elevation of the viewer, (ELEVATIONS, J), so that Σ share · mass = 1.
-    mass: of the terms, (J · K).
-    terms: their CDF for each elevation, (ELEVATIONS, J · K + 1).
+    share: of each lobe at each elevation of the viewer, (ELEVATIONS, J); the probabilities add up to 1.
+    mass: of each term, its integral over half vectors, relative to all, (J · K).
+    terms: the CDF of the terms for each elevation, (ELEVATIONS, J · K + 1).
     rows, columns: the CDFs of θ_h's rows and φ_h's columns, (J · K, ROWS + 1) and (J · K, COLUMNS + 1).
     """
 
@@ -59,12 +59,12 @@ class LawrenceSampler(Sampler):
 
     @classmethod
     def fitted(cls, brdf: Brdf) -> LawrenceSampler:
-        """The sampler of a BRDF, which is factored if it is not yet. Raises MissingDependencyError as `factor` does."""
+        """The sampler of a BRDF, which is factored first if need be. Raises the errors of `factor`."""
         return cls.of(brdf, brdf if isinstance(brdf, FactoredBrdf) else factor(brdf, FEW))
 
     @classmethod
     def of(cls, brdf: Brdf, factored: FactoredBrdf) -> LawrenceSampler:
-        """The sampler that draws, for a BRDF, from a factored form of it."""
+        """The sampler for a BRDF that draws from a factored form of it."""
         u, v = (part.astype(np.float64).reshape(len(part), -1).T for part in (factored.rows, factored.columns))
         bands = _bands()
         mass = factored.scale.reshape(-1).astype(np.float64) * (u @ bands) * v.sum(axis=1)
@@ -84,7 +84,7 @@ class LawrenceSampler(Sampler):
         )
 
     def buffers(self) -> dict[str, NDArray[Any]]:
-        # What `density` multiplies: of each interval, its probability per solid angle, for one term after the other.
+        # The factors of `density`: for each interval and each term, the probability per solid angle.
         per_row = np.diff(self.rows).T / _bands()[:, None] * self.mass
         flat = {"share": self.share, "terms": self.terms, "rows": self.rows, "columns": self.columns}
         flat |= {"per_row": per_row.astype(np.float32), "per_column": np.diff(self.columns).T}
@@ -139,11 +139,11 @@ class LawrenceSampler(Sampler):
 
 
 def _bands() -> NDArray[np.float64]:
-    """The solid angle of a cell of each row, both sides together."""
+    """The solid angle of a cell of each row: of its two halves, to both sides of the viewer, together."""
     return 2 * np.diff(_height(np.arange(ROWS + 1.0))) * (TWO_PI / COLUMNS)
 
 
 def _height(row: Array) -> Array:
-    """sin² (θ_h / 2) at a row's upper edge."""
+    """sin² (θ_h / 2) at a place on the axis of rows."""
     sin = ops(row).sin((row * row) * (PI / 4 / ROWS**2))
     return sin * sin

@@ -1,14 +1,14 @@
-"""A table of directions to the light for each elevation of the viewer: Matusik's sampler.
+"""Matusik's sampler: a table of directions to the light for each elevation of the viewer.
 
 Matusik 2003, "A Data-Driven Reflectance Model" (thesis, MIT), as Lawrence, Rusinkiewicz & Ramamoorthi 2004 describe it
-in their section 2; the thesis itself was not at hand. What is tabulated for an elevation is f_r cos θ_i sin θ_i over
-θ_i and φ, the mean of the channels; a marginal distribution in θ_i and a conditional one in φ for each θ_i are
-inverted. It is here to be compared with: it follows any material closely, and is as large as a measured table of one
-channel.
+in their section 2; we have not read the thesis itself. For each elevation, f_r cos θ_i sin θ_i (the mean of the
+channels) is tabulated over θ_i and φ, and directions are drawn from the marginal distribution of θ_i and the
+conditional distribution of φ. We have it for comparison: it follows any material closely, but is as large as one
+channel of a measured table.
 
-Two things are our own. A material here is isotropic and taken to look the same from both sides of the plane of the
-viewer, so that half of the circle is stored. Within a cell, directions follow the cosine: weights are then f_r at the
-direction over f_r at the cell's centre, up to the horizon.
+Two things are our own. We store only half of the circle in φ, since isotropic materials are taken to be symmetric about
+the plane of the viewer. Within a cell, directions follow the cosine, so that weights are f_r at the direction divided
+by f_r at the centre of the cell, up to the horizon.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from ..reflectance.half_diff import spherical
 from .sampler import PI, Sampler
 from .tables import cumulative, inverted, probability
 
-ELEVATIONS = 90  # of the viewer, equal in θ_o; each table serves the whole of its degree, from its centre
+ELEVATIONS = 90  # of the viewer, one for each degree of θ_o, at its middle
 ROWS, COLUMNS = 90, 180  # of a table: equal in θ_i, and in φ over half of the circle
 HEIGHT, WIDTH = PI / 2 / ROWS, PI / COLUMNS  # of a cell [rad]
-# The share of each distribution that follows the cosine, so that no direction is left out. It gives every cell at least
-# 50 units in the last place of a CDF in single precision.
+# The share of each distribution that follows the cosine, so that every direction can be drawn. The probability of a
+# cell is then at least 50 units in the last place of a CDF in single precision.
 FLOOR = 0.01
-UPRIGHT = 1e-20  # sin² θ_o of viewers that have no azimuth
+UPRIGHT = 1e-20  # for a smaller sin² θ_o, the viewer's azimuth is taken for 0
 
 
 @dataclass(frozen=True)
 class MatusikSampler(Sampler):
-    """Directions to the light from a table for each elevation of the viewer, megabytes in all: as large as the BRDF.
+    """Draws directions to the light from a table for each elevation of the viewer. The tables take several megabytes.
 
     rows: cumulative probabilities of θ_i's rows, (ELEVATIONS, ROWS + 1), from 0 to 1.
     columns: those of φ's columns in each row, (ELEVATIONS, ROWS, COLUMNS + 1), from 0 to 1. φ is counted from the
@@ -95,7 +95,7 @@ def _polar(w: Triple) -> Array:
 
 
 def _bin(x: Array, width: float, count: int) -> Array:
-    """The number of the bin that holds x, the last one for what is beyond."""
+    """The number of the bin that holds x, or of the last bin if x is beyond it."""
     f = ops(x)
     return f.bin(x * (1 / width), count)
 
@@ -115,17 +115,17 @@ def _azimuth(wo: Triple) -> tuple[Array, Array]:
 
 
 def _band(row: Array) -> Array:
-    """∫ 2 sin θ cos θ dθ over a row: sin² θ at its end less that at its beginning. All rows' add up to 1."""
+    """∫ 2 sin θ cos θ dθ over a row, which is sin² θ at its end minus sin² θ at its start. All rows add up to 1."""
     return math.sin(HEIGHT) * ops(row * HEIGHT).sin((2 * row + 1) * HEIGHT)
 
 
 def _per_solid_angle(share: Array, band: Array, cos: Array) -> Array:
-    """The density of directions that follow the cosine in a cell, drawn with that probability on either side."""
+    """The density [1/sr] of directions that follow the cosine in a cell. share: the cell's probability."""
     return share * cos / (band * WIDTH)
 
 
 def _light(brdf: Brdf, theta_o: float) -> NDArray[np.float64]:
-    """The light of each cell for one elevation of the viewer, (ROWS, COLUMNS), up to a factor."""
+    """The reflected light of each cell for one elevation of the viewer, (ROWS, COLUMNS), up to a constant factor."""
     theta, phi = (np.arange(ROWS) + 0.5) * HEIGHT, (np.arange(COLUMNS) + 0.5) * WIDTH
     wi = np.stack(spherical(*np.broadcast_arrays(theta[:, None], phi)), axis=-1)
     f_r = brdf.eval(wi, np.array(spherical(np.float64(theta_o), np.float64(0.0))))

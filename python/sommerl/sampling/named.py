@@ -1,4 +1,4 @@
-"""The samplers by name."""
+"""All samplers, by the names that users write."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SAMPLERS: dict[str, type[Sampler]] = {
 
 
 def fitted(name: str, brdf: Brdf) -> Sampler:
-    """The sampler of that name for a BRDF. Raises OptionError if there is none of that name."""
+    """The sampler of a name, fitted to a BRDF. Raises OptionError if there is no sampler of that name."""
     if name not in SAMPLERS:
         raise OptionError(f"sampler: expected {' or '.join(SAMPLERS)}, found {name}")
     return SAMPLERS[name].fitted(brdf)

@@ -1,4 +1,4 @@
-"""What every importance sampler is: directions to the light for a direction to the viewer, and their density."""
+"""The base class of all importance samplers."""
 
 from __future__ import annotations
 
@@ -12,25 +12,26 @@ from ..reflectance.arrays import Array, Triple, split
 from ..reflectance.brdf import Brdf, Buffers, finite, told, vectors
 
 PI = np.pi
-UP = np.array([0.0, 0.0, 1.0])  # in the place of directions that are none
+UP = np.array([0.0, 0.0, 1.0])  # takes the place of directions that are not valid
 
 
 class Sampler(ABC):
-    """An importance sampler of one BRDF. A subclass gives two formulas, which run on NumPy and on Dr.Jit arrays.
+    """An importance sampler of one BRDF: it draws a direction to the light for a direction to the viewer.
 
-    brdf: the one whose light it follows, and whose light `sample` weighs.
+    A subclass implements `draw` and `density`, which run on NumPy and on Dr.Jit arrays. brdf: the BRDF that the sampler
+    is fitted to, and from which `sample` computes weights.
     """
 
-    name: str  #: as users write it: see `named`
+    name: str  #: the name that users write: see `named`
     brdf: Brdf
 
     @classmethod
     @abstractmethod
     def fitted(cls, brdf: Brdf) -> Self:
-        """The sampler for a BRDF."""
+        """A sampler for a BRDF."""
 
     def buffers(self) -> dict[str, NDArray[Any]]:
-        """The NumPy arrays that the formulas read, by name; one of shape () is a number.
+        """The NumPy arrays that `draw` and `density` read, by name; an array of shape () is a number.
 
         A renderer uploads them once.
         """
@@ -38,32 +39,33 @@ class Sampler(ABC):
 
     @property
     def bytes_memory(self) -> int:
-        """The bytes of these arrays."""
+        """The size of these arrays [bytes]."""
         return sum(buffer.nbytes for buffer in self.buffers().values())
 
     @abstractmethod
     def draw(self, wo: Triple, u: Triple, buffers: Buffers) -> tuple[Triple, Array]:
-        """A direction wi for `wo` and uniform random numbers u in [0, 1)³, and its density [1/sr].
+        """Draws a direction wi for `wo` with uniform random numbers u in [0, 1)³; returns it and its density [1/sr].
 
-        Where the density is 0, nothing was drawn: `wo`, or what came out, is below the horizon.
+        A density of 0 means that the draw failed: `wo` or the drawn direction is below the horizon.
         """
 
     @abstractmethod
     def density(self, wi: Triple, wo: Triple, buffers: Buffers) -> Array:
-        """The density [1/sr] of drawing `wi` for `wo`; 0 where either is below the horizon."""
+        """The density [1/sr] of drawing `wi` for `wo`; 0 if either is below the horizon."""
 
     def sample(
         self, wo: ArrayLike, u: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Directions to the light for directions to the viewer `wo` and random numbers `u`, both of shape (..., 3).
+        """Draws directions to the light for directions to the viewer `wo` with random numbers `u`, both (..., 3).
 
-        Returns wi (..., 3), their densities [1/sr] (...), and their weights f_r cos θ_i / pdf (..., 3), whose mean is
-        the albedo. Density and weight are 0 where nothing was drawn. All three are NaN where `wo` or `u` is not finite.
-        Raises ValueError for other shapes, for what are not real numbers, and for `u` outside of [0, 1].
+        Returns directions wi (..., 3), their densities [1/sr] (...), and weights f_r cos θ_i / pdf (..., 3), whose mean
+        is the albedo. Density and weight are 0 where a draw failed (see `draw`). All three are NaN where `wo` or `u` is
+        not finite. Raises ValueError for other shapes, for values that are not real numbers, and for `u` outside [0,
+        1].
         """
         viewer, numbers = vectors("sample", wo, u)
         if ((numbers < 0) | (numbers > 1)).any():
-            raise ValueError("sample: expected random numbers from 0 to 1, found others")
+            raise ValueError("sample: random numbers have to be from 0 to 1, and some are not")
         known = np.asarray(np.isfinite(viewer + numbers).all(axis=-1))
         above = known & (viewer[..., 2] > 0)
         viewer = np.where(above[..., None], viewer, UP)
@@ -79,10 +81,10 @@ class Sampler(ABC):
         return light, np.where(known, pdf, np.nan), weight
 
     def pdf(self, wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float64]:
-        """The density [1/sr] of drawing `wi` for `wo`, unit directions of shape (..., 3), which broadcast.
+        """The density [1/sr] of drawing `wi` for `wo`, unit vectors of shape (..., 3), which broadcast.
 
-        As in `Brdf.eval`, NaN where a component of either is not finite, else 0 where either is not above the horizon.
-        Raises ValueError for other shapes, and for what are not real numbers.
+        As in `Brdf.eval`, it is NaN where a component is not finite, and 0 where a direction is not above the horizon.
+        Raises ValueError for other shapes, and for values that are not real numbers.
         """
         light, viewer = vectors("pdf", wi, wo)
         known, above = told(light, viewer)

@@ -1,1 +1,1 @@
-"""What carries the rest, and knows nothing of reflectance: errors, files, signals, threads."""
+"""What every other room uses and what has nothing to do with reflectance: errors, files, signals, threads."""

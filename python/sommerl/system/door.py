@@ -1,8 +1,8 @@
-"""The door that files come in by: readers get bytes, and open nothing themselves.
+"""Opening and reading input files. Readers of formats get bytes from here, and open no files themselves.
 
-A file is opened once, without waiting, and has to be a regular one: nobody waits for a pipe, and no device is read. Of
-what it holds, at most one byte more than its reader takes is read, whatever the system says of its length. All that is
-said of it, its digest too, is of these bytes: it does not matter who changes it meanwhile.
+Only regular files are read: a pipe could make us wait for ever, and a device may have no end. A file is opened once and
+read once, so that its SHA-256 and its contents are of the same bytes even if somebody changes it meanwhile. Each reader
+says how long its files may be; at most one byte more than that is read, whatever length the system reports.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 from .errors import FormatError
 
 HEAD_BYTES = 4096
-STEP = 2**20  # bytes that are read at once of a file that is longer than it says
+STEP = 2**20  # bytes read at a time once a file has turned out longer than the system said
 KINDS = {
     stat.S_IFDIR: "a directory",
     stat.S_IFIFO: "a pipe",
@@ -26,24 +26,25 @@ KINDS = {
     stat.S_IFCHR: "a device",
     stat.S_IFBLK: "a device",
 }
+# Opening a pipe would otherwise wait for a writer, and opening a terminal could make it ours.
 WITHOUT_WAITING: int = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0)
 
 
 class File:
-    """An open file. head: its first bytes, HEAD_BYTES at most."""
+    """An open file. head: its first bytes, at most HEAD_BYTES, from which formats are recognised."""
 
     def __init__(self, path: Path, stream: FileIO) -> None:
         self.path, self._stream = path, stream
         self.head = stream.read(HEAD_BYTES) or b""
 
     def read(self, most: int) -> bytes:
-        """All of it. Raises FormatError if it is longer than `most` bytes, or cannot be read; to be called once."""
-        with _told(self.path):
+        """The whole content. Call it once. Raises FormatError if it is longer than `most` bytes or cannot be read."""
+        with _readable(self.path):
             length = os.fstat(self._stream.fileno()).st_size
             if length > most:
                 raise FormatError(f"{self.path}: expected at most {most} bytes, found {length}")
             parts, size = [self.head], len(self.head)
-            while size <= most:  # it may have grown, or be one of those that say that they are empty
+            while size <= most:  # the file may have grown; some files of the system report a length of 0
                 wanted = length + 1 - size if size <= length else min(STEP, most + 1 - size)
                 part = self._stream.read(wanted) or b""
                 if not part:
@@ -55,8 +56,10 @@ class File:
 
 @contextmanager
 def opened(path: str | Path, what: str = "a file") -> Generator[File]:
-    """A file to read. what: a reader takes, for people. Raises FormatError if it is not there, no regular file, or
-    cannot be read."""
+    """Opens a file for reading. what: the kind of file that is needed, for the error message.
+
+    Raises FormatError if the file does not exist, is not a regular file, or cannot be read.
+    """
     path = Path(path)
 
     def opener(name: str, flags: int) -> int:
@@ -68,21 +71,21 @@ def opened(path: str | Path, what: str = "a file") -> Generator[File]:
         return handle
 
     with ExitStack() as stack:
-        with _told(path, what):
+        with _readable(path):
             stream = stack.enter_context(FileIO(path, opener=opener))
             file = File(path, stream)
         yield file
 
 
 def read(path: str | Path, most: int, what: str = "a file") -> bytes:
-    """The bytes of a file of at most `most`. Raises FormatError, as `opened` does."""
+    """The bytes of a file. Raises FormatError if there are more than `most`, and where `opened` does."""
     with opened(path, what) as file:
         return file.read(most)
 
 
 @contextmanager
 def copied(data: bytes, suffix: str) -> Generator[Path]:
-    """A file of our own with these bytes, for readers that take nothing but a file; it is gone afterwards."""
+    """The path of a temporary file with these bytes, for libraries that can read only files. Removed afterwards."""
     with ExitStack() as stack:
         try:
             path = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sommerl-"))) / f"copy{suffix}"
@@ -93,11 +96,11 @@ def copied(data: bytes, suffix: str) -> Generator[Path]:
 
 
 @contextmanager
-def _told(path: Path, what: str = "a file") -> Generator[None]:
-    """Says in one sentence what the system says."""
+def _readable(path: Path) -> Generator[None]:
+    """Turns errors of the system into a FormatError that names the file."""
     try:
         yield
     except FileNotFoundError as error:
-        raise FormatError(f"{path}: expected {what}, found none") from error
-    except (OSError, ValueError) as error:  # the latter for names that no file can have
+        raise FormatError(f"{path}: there is no such file") from error
+    except (OSError, ValueError) as error:  # ValueError: a name that no file can have, as with a zero byte
         raise FormatError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from error

@@ -1,8 +1,8 @@
-"""Writing files: none is ever half-written, and none that is somebody else's is lost.
+"""Writing files: no file is ever half-written, and commands do not overwrite files that Sommerl did not write.
 
-A command (`keeping`) replaces what Sommerl wrote, which carries a mark (`MARKS`), and nothing else: no file of a
-measured format and none without such a mark, unless it is told to. As a library, Sommerl replaces any file, as
-`numpy.save` does.
+Files that Sommerl writes carry a mark (`MARKS`). Within `keeping`, which commands use, an existing file is replaced
+only if it has such a mark and is not of a format in which measurements come (`MEASURED`), unless the user asks for it
+with --overwrite. As a library, Sommerl replaces any file, as `numpy.save` does.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from pathlib import Path
 from typing import BinaryIO
 
 from .errors import OptionError
-from .interrupt import temporaries, undisturbed
+from .interrupt import hold_interrupts, temporaries
 
 if sys.platform != "win32":
     import fcntl
 
-# How files that Sommerl writes begin, and what else is in their first or last bytes, as a pattern. A format that is
-# added to those that are written has its line here.
+# Of each format that Sommerl writes: how its files begin, and a regular expression that is found in their first or last
+# WITHIN bytes. Every new format needs a line here, or commands would not replace their own files.
 MARKS: tuple[tuple[bytes, bytes], ...] = (
     (b"SMRL", b""),
     (b"FBRD", b""),
@@ -43,12 +43,12 @@ MARKS: tuple[tuple[bytes, bytes], ...] = (
     (b"// ", rb"\A// [^\n]*\n// Written by Sommerl"),
     (b"{", rb'\A\{\s*"sommerl_fits"'),
     (b"{", rb'\A\{\s*"comment": "Written by Sommerl\.'),
-    # The tables of `paper` have no place for a mark, but heads of their own.
+    # CSV has no place for a mark, so the tables of `sommerl paper` are recognised by their column names.
     (b"material,model,error,error_som_man,paper,paper_som_man\n", b""),
     (b"model,psnr_frame_db,psnr_object_db,paper_db\n", b""),
 )
-LOOKED_AT = 2**14  # bytes at either end
-# Of these formats, there is no telling whether a file was measured or made.
+WITHIN = 2**14  # bytes at the beginning and at the end of a file in which its mark is searched for
+# Files of these formats may be measurements, whoever wrote them.
 MEASURED = (".binary", ".bsdf", ".brdf", ".npy", ".npz", ".h5", ".hdf5")
 
 _replacing: ContextVar[bool] = ContextVar("replacing", default=True)
@@ -56,7 +56,7 @@ _replacing: ContextVar[bool] = ContextVar("replacing", default=True)
 
 @contextmanager
 def keeping(*, overwrite: bool) -> Generator[None]:
-    """Within the block, only files that Sommerl wrote are replaced, unless `overwrite`."""
+    """Within the block, only files that Sommerl wrote may be replaced; with `overwrite`, any file."""
     before = _replacing.set(overwrite)
     try:
         yield
@@ -66,11 +66,12 @@ def keeping(*, overwrite: bool) -> Generator[None]:
 
 @contextmanager
 def atomic_write(path: Path) -> Generator[BinaryIO]:
-    """A file to write to that takes the name `path` when, and only when, the block ends without an error.
+    """A file to write to, which gets the name `path` only if the block ends without an error.
 
-    A file that had the name before is replaced then, and hands on its mode. A pipe or a device is written to instead.
-    Raises OSError if it cannot be written, and OptionError if a command is to keep what has that name by then; that is
-    then still there.
+    Until then it has a temporary name in the same folder. An existing file of that name is replaced at the end, and
+    the new one gets its permissions. If `path` is a pipe or a device, the bytes are written to it at the end.
+    Raises OSError if the file cannot be written, and OptionError if there is a file that must not be replaced (see
+    `keeping`), even if it has appeared in the meantime; that file stays as it is.
     """
     target = _target(path)
     if target is None:
@@ -83,25 +84,27 @@ def atomic_write(path: Path) -> Generator[BinaryIO]:
     temporary = None
     try:
         with _named(target):
-            with undisturbed():
+            with hold_interrupts():
                 temporary = _opened(target)
             yield temporary.out
             temporary.out.flush()
-            os.fsync(temporary.out.fileno())  # a disk that is full may say so this late
-        with undisturbed():
+            os.fsync(temporary.out.fileno())  # only now may the system report that the disk is full
+        with hold_interrupts():
             if _target(path) != target:
-                raise OSError(errno.EEXIST, "cannot be written (something else has taken its name)", str(path))
+                raise OSError(
+                    errno.EEXIST, "cannot be written (another file or folder has taken its name meanwhile)", str(path)
+                )
             temporary.take_place(target)
     finally:
         if temporary:
-            with undisturbed():
+            with hold_interrupts():
                 temporary.discard()
 
 
 def check_writable(path: Path) -> None:
-    """Raises now what writing a file of that name would raise later, after long work: OSError, OptionError.
+    """Raises the error (OSError or OptionError) that writing the file would raise, so that it comes before long work.
 
-    Temporary files that killed runs left beside it are removed.
+    Also removes temporary files that were left beside it by runs that were killed.
     """
     target = _target(path)
     if target is None:
@@ -117,7 +120,7 @@ def check_writable(path: Path) -> None:
 
 
 def remove_left_over(path: Path) -> None:
-    """Removes the temporary files of runs that were killed while they wrote a file of that name."""
+    """Removes temporary files that were left by runs that were killed while they wrote a file of this name."""
     path = Path(os.path.realpath(path))
     try:
         left = [entry.path for entry in os.scandir(path.parent) if entry.name.startswith(_prefix(path))]
@@ -128,9 +131,11 @@ def remove_left_over(path: Path) -> None:
 
 
 def _target(path: Path) -> Path | None:
-    """The file that is to be written for a name: where links lead. None for a pipe or a device, which has no content to
-    replace. Raises OSError or OptionError for what cannot be written or is to be kept."""
-    target = Path(os.path.realpath(path))  # a link stays a link
+    """The file to write for a path, with symbolic links followed; None for a pipe or a character device.
+
+    Raises OSError if it cannot be written, OptionError if there is a file that must not be replaced.
+    """
+    target = Path(os.path.realpath(path))  # the file that a link leads to is replaced, not the link
     try:
         with _named(path):
             found = path.stat()
@@ -140,19 +145,21 @@ def _target(path: Path) -> Path | None:
         return None
     if not stat.S_ISREG(found.st_mode):
         kinds = {stat.S_IFDIR: "directory", stat.S_IFSOCK: "socket", stat.S_IFBLK: "block device"}
-        kind = kinds.get(stat.S_IFMT(found.st_mode), "thing of another kind")
+        kind = kinds.get(stat.S_IFMT(found.st_mode), "special file")
         code = errno.EISDIR if kind == "directory" else errno.EINVAL
-        raise OSError(code, f"expected a file to write, found a {kind}", str(path))
+        raise OSError(code, f"cannot be written: it is a {kind}, not a file", str(path))
     if not os.access(path, os.W_OK):
         raise PermissionError(errno.EACCES, "cannot be written (Permission denied)", str(path))
     if found.st_size and not _replacing.get():
         if any(name.suffix.lower() in MEASURED for name in (path, target)):
             raise OptionError(
-                f"{path}: expected a new name, found a file of a measured format; --overwrite replaces it"
+                f"{path}: there is already a file of this name, which may be a measurement: choose another name, or "
+                "replace it with --overwrite"
             )
         if not _ours(path):
             raise OptionError(
-                f"{path}: expected a new name or a file that Sommerl wrote, found another file; --overwrite replaces it"
+                f"{path}: there is already a file of this name, which Sommerl did not write: choose another name, or "
+                "replace it with --overwrite"
             )
     return target
 
@@ -161,9 +168,9 @@ def _ours(path: Path) -> bool:
     """Whether a file carries the mark of one that Sommerl wrote."""
     try:
         with path.open("rb") as file:
-            head = file.read(LOOKED_AT)
-            file.seek(max(file.tell(), os.fstat(file.fileno()).st_size - LOOKED_AT))
-            ends = head + file.read(LOOKED_AT)
+            head = file.read(WITHIN)
+            file.seek(max(file.tell(), os.fstat(file.fileno()).st_size - WITHIN))
+            ends = head + file.read(WITHIN)
     except OSError:
         return False
     return any(head.startswith(start) and re.search(mark, ends) for start, mark in MARKS)
@@ -171,19 +178,19 @@ def _ours(path: Path) -> bool:
 
 @dataclass
 class _Temporary:
-    """A file under another name. It is locked for as long as it is open: one that is not was left by a killed run."""
+    """A file under a temporary name. It is locked while it is open; if it is not locked, its run was killed."""
 
     out: BinaryIO
     path: str
 
     def take_place(self, target: Path) -> None:
-        """Takes the name, and the mode of the file that had it; that of a new one is what the umask leaves."""
+        """Gives the file its final name, and the permissions of the file that it replaces or of a new one."""
         try:
             mode = stat.S_IMODE(target.stat().st_mode)
         except FileNotFoundError:
             umask = os.umask(0)
             os.umask(umask)
-            mode = 0o666 & ~umask  # mkstemp makes files that only their owner can read
+            mode = 0o666 & ~umask  # mkstemp makes files that only their owner can read, unlike `open`
         with _named(target):
             os.chmod(self.path, mode)
             if sys.platform == "win32":
@@ -192,9 +199,9 @@ class _Temporary:
         temporaries.discard(self.path)
 
     def discard(self) -> None:
-        """Closes the file, and removes it unless it has taken its name."""
+        """Closes the file, and removes it if it still has its temporary name."""
         with suppress(OSError):
-            self.out.close()  # what could not be written is tried once more
+            self.out.close()  # writes what is still buffered, which may fail
         if self.path in temporaries:
             with suppress(OSError):
                 os.unlink(self.path)
@@ -208,27 +215,27 @@ def _opened(target: Path) -> _Temporary:
         _lock(handle)
         if os.path.exists(path):
             return _Temporary(os.fdopen(handle, "wb"), path)
-        os.close(handle)  # before it was locked, another run took it for one that was left
+        os.close(handle)  # another run has removed the file, since it was not locked yet
         temporaries.discard(path)
 
 
 def _prefix(target: Path) -> str:
-    """How the names of temporary files for a target begin: of the same length for the longest names."""
+    """How names of temporary files for a target begin: with a hash, since its own name may be too long to add to."""
     return f".sommerl-{hashlib.sha256(os.fsencode(target.name)).hexdigest()[:16]}-"
 
 
 def _lock(handle: int) -> None:
-    """Locks a file for as long as it is open, where there are locks."""
+    """Locks a file for as long as it is open, if the system and the disk have locks."""
     if sys.platform != "win32":
         with suppress(OSError):
             fcntl.flock(handle, fcntl.LOCK_EX)
 
 
 def _remove_if_left(temporary: str) -> None:
-    """Removes a temporary file that nobody has open."""
-    with suppress(OSError):  # somebody has, or has removed it, or it is not ours to remove
+    """Removes a temporary file unless a running process has it open."""
+    with suppress(OSError):  # it is open, has been removed already, or belongs to another user
         if sys.platform == "win32":
-            os.unlink(temporary)  # which fails for one that is open
+            os.unlink(temporary)  # on Windows, fails if the file is open
             return
         handle = os.open(temporary, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
         try:
@@ -240,7 +247,7 @@ def _remove_if_left(temporary: str) -> None:
 
 @contextmanager
 def _named(path: Path) -> Generator[None]:
-    """Errors speak of the file that was meant, not of a temporary one."""
+    """Makes errors name the file to be written instead of its temporary file."""
     try:
         yield
     except OSError as error:

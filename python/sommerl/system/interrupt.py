@@ -1,6 +1,7 @@
-"""What ends a command from outside, SIGINT (Ctrl-C) and SIGTERM: KeyboardInterrupt, but not in mid-air.
+"""How commands react to SIGINT (Ctrl-C) and SIGTERM: KeyboardInterrupt, but only where it is safe to stop.
 
-As a library, Sommerl leaves signals to the program that it is in. The command line calls `heed` once.
+The command line calls `handle_signals` once. As a library, Sommerl leaves signals to the program that uses it; it only
+holds Ctrl-C back for a moment where stopping would do harm (`hold_interrupts`).
 """
 
 from __future__ import annotations
@@ -15,34 +16,34 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-STATUS = 130  # of a command that was interrupted
+STATUS = 130  # the exit status of a command that was interrupted
 PATIENCE = 0.3  # seconds in which signals count as one: `timeout` and terminals send each twice
 
-temporaries: set[str] = set()  #: paths of files that go if the process has to end at once
-_holds: list[list[int]] = []  # the signals that came in the block that is not to be disturbed, if there is one
+temporaries: set[str] = set()  #: paths of temporary files, which are removed if the process has to end at once
+_holds: list[list[int]] = []  # while `hold_interrupts` is active: one list, of the signals that have come
 
 
 class _State:
-    first: float | None = None  # when the command was first told to end
+    first: float | None = None  # when the first signal came
 
 
-def heed() -> None:
-    """From now on, SIGINT and SIGTERM raise KeyboardInterrupt in the main thread, once; another one later ends the
-    process at once. Signals that are ignored stay so, as in a shell's background jobs."""
+def handle_signals() -> None:
+    """From now on, the first SIGINT or SIGTERM raises KeyboardInterrupt in the main thread; a second one, more than
+    PATIENCE later, ends the process at once. Signals that are ignored stay ignored, as in a shell's background jobs."""
     for number in SIGNALS:
         if signal.getsignal(number) not in (signal.SIG_IGN, None):
-            signal.signal(number, _told)
-    sys.unraisablehook = _again
+            signal.signal(number, _on_signal)
+    sys.unraisablehook = _resend
 
 
-def unheeded() -> None:
-    """From now on, signals change nothing: the command is at its end, and Python takes itself apart."""
+def ignore_signals() -> None:
+    """From now on, signals are ignored: the command is done, and Python is shutting down."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 
 
 def remove_temporaries() -> None:
-    """Removes what is half-written."""
+    """Removes all files that are not completely written."""
     for path in list(temporaries):
         with suppress(OSError):
             os.unlink(path)
@@ -50,11 +51,14 @@ def remove_temporaries() -> None:
 
 
 @contextmanager
-def undisturbed() -> Generator[None]:
-    """Holds an interruption back until the block has ended, and raises KeyboardInterrupt then: what was under way is
-    not to be used. Within imports, renders and calls that start threads, others make another error of it, or leave
-    their threads to write to memory that is gone."""
-    command = any(signal.getsignal(number) is _told for number in SIGNALS)
+def hold_interrupts() -> Generator[None]:
+    """If SIGINT or SIGTERM comes within the block, KeyboardInterrupt is raised only when the block has ended.
+
+    Use it around imports, renders and calls that start threads. Libraries may turn an interruption there into another
+    error, or may return while their threads still write to memory that is then freed. The result of a block that was
+    interrupted must not be used, since it may be incomplete.
+    """
+    command = any(signal.getsignal(number) is _on_signal for number in SIGNALS)
     library = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if threading.current_thread() is not threading.main_thread() or _holds or not (command or library):
         yield
@@ -76,8 +80,8 @@ def undisturbed() -> Generator[None]:
         raise KeyboardInterrupt
 
 
-def _told(number: int, frame: FrameType | None) -> None:
-    """The command line's handler."""
+def _on_signal(number: int, frame: FrameType | None) -> None:
+    """The command line's handler of signals."""
     now = time.monotonic()
     if _State.first is None:
         _State.first = now
@@ -89,8 +93,8 @@ def _told(number: int, frame: FrameType | None) -> None:
         os._exit(STATUS)
 
 
-def _again(unraisable: sys.UnraisableHookArgs) -> None:
-    """An interruption that came where nobody could be told of it, as while Python collects garbage, comes again."""
+def _resend(unraisable: sys.UnraisableHookArgs) -> None:
+    """Sends a signal again if its KeyboardInterrupt was lost, as happens to one that is raised in a destructor."""
     if unraisable.exc_type is KeyboardInterrupt:
         _State.first = None
         threading.Timer(0.01, os.kill, [os.getpid(), signal.SIGINT]).start()

@@ -1,7 +1,7 @@
-"""Dr.Jit with an LLVM that works.
+"""Loads Dr.Jit with an LLVM that works.
 
-Dr.Jit needs libLLVM 17 or newer. Given an older one, which is what many systems install, it either stays inactive or
-aborts the process on its first minimum or maximum; so it is never left to find one by itself.
+Dr.Jit needs libLLVM 17 or newer. With an older one, which is what many systems install, it either does not work at all
+or aborts the process at the first minimum or maximum. So Dr.Jit never searches for a libLLVM: we choose one for it.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from pathlib import Path
 from typing import Any
 
 from .errors import MissingDependencyError
-from .interrupt import undisturbed
+from .interrupt import hold_interrupts
 from .threads import limit
 
 OLDEST_LLVM = 17
 PATH_VARIABLE = "DRJIT_LIBLLVM_PATH"
-LEAST_THREADS = 2  # the caller's among them: with one, Mitsuba waits for ever when it reads or writes OpenEXR files
+LEAST_THREADS = 2  # the caller's included; with 1, Mitsuba waits for ever when it reads or writes OpenEXR files
 
 
 def drjit() -> Any:
     """The module `drjit`. Raises MissingDependencyError if it is not installed."""
     if importlib.util.find_spec("drjit") is None:
         raise MissingDependencyError("fitting needs Dr.Jit: install sommerl[fit]")
-    with undisturbed():
+    with hold_interrupts():
         choose_llvm()
         dr = importlib.import_module("drjit")
     threads = limit()
@@ -43,7 +43,7 @@ def drjit() -> Any:
 
 @contextmanager
 def limited() -> Generator[None]:
-    """For long work: no more threads than the limit, which may be one."""
+    """Within the block, Dr.Jit uses no more threads than the limit, even if that is 1 (see LEAST_THREADS)."""
     dr, threads = drjit(), limit()
     before = dr.thread_count()
     if threads is None or threads == before:
@@ -57,33 +57,33 @@ def limited() -> Generator[None]:
 
 
 def float64() -> Any:
-    """Dr.Jit's type of arrays of double precision that can be differentiated.
+    """Dr.Jit's type for differentiable arrays of double precision.
 
-    Raises MissingDependencyError if there is no LLVM to compile for the processor.
+    Raises MissingDependencyError if there is no LLVM that compiles for this processor.
     """
     dr = drjit()
     if not has_llvm(dr):
         raise MissingDependencyError(
-            f"fitting: expected a libLLVM {OLDEST_LLVM} or newer, found none; on Linux, install sommerl[fit], or set "
+            f"fitting needs libLLVM {OLDEST_LLVM} or newer, and none was found: on Linux, install sommerl[fit], or set "
             f"{PATH_VARIABLE}"
         )
-    with undisturbed():
+    with hold_interrupts():
         return importlib.import_module("drjit.llvm.ad").Float64
 
 
 def has_llvm(dr: Any) -> bool:
-    """Whether Dr.Jit found an LLVM, and a recent one."""
+    """Whether Dr.Jit has loaded an LLVM that is new enough."""
     return dr.has_backend(dr.JitBackend.LLVM) and dr.detail.llvm_version()[0] >= OLDEST_LLVM
 
 
 def found_llvm(dr: Any) -> str:
-    """What Dr.Jit found, for people."""
+    """Which LLVM Dr.Jit has loaded, for error messages."""
     active = dr.has_backend(dr.JitBackend.LLVM)
-    return f"libLLVM {dr.detail.llvm_version()[0]}" if active else "none that Dr.Jit takes"
+    return f"libLLVM {dr.detail.llvm_version()[0]}" if active else "none"
 
 
 def choose_llvm() -> None:
-    """Tells Dr.Jit, if not imported yet, which libLLVM to load: none rather than one that it would find by itself."""
+    """Sets which libLLVM Dr.Jit will load, if Dr.Jit is not imported yet. If none is new enough, it will load none."""
     if "drjit" not in sys.modules:
         os.environ[PATH_VARIABLE] = find_llvm() or os.devnull
 
@@ -94,14 +94,14 @@ def find_llvm() -> str | None:
 
 
 def llvm_version(path: str) -> int:
-    """The major version that a libLLVM reports of itself; 0 if it cannot be loaded or does not say."""
+    """The major version that a libLLVM reports; 0 if it cannot be loaded or reports none."""
     try:
         library = ctypes.CDLL(path)
         major, minor, patch = (ctypes.c_uint() for _ in range(3))
         library.LLVMGetVersion(ctypes.byref(major), ctypes.byref(minor), ctypes.byref(patch))
         return major.value
     except (OSError, AttributeError):
-        # LLVMGetVersion came with LLVM 16: what lacks it is older.
+        # LLVMGetVersion exists since LLVM 16, so a library without it is older.
         return 0
 
 

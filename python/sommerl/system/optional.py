@@ -1,4 +1,4 @@
-"""Packages that are not needed for everything, imported where they are."""
+"""Imports of optional packages, which only some commands need."""
 
 from __future__ import annotations
 
@@ -7,14 +7,20 @@ import warnings
 from typing import Any
 
 from .errors import MissingDependencyError
-from .interrupt import undisturbed
+from .interrupt import hold_interrupts
 
 
 def optional(module: str, package: str, purpose: str, extra: str) -> Any:
-    """A module of an optional package. Raises MissingDependencyError, which says what for and how to install it."""
+    """A module of an optional package.
+
+    package: its name for people. purpose: what needs it. extra: the extra of `sommerl` that installs it.
+    Raises MissingDependencyError if it is not installed.
+    """
     try:
-        with undisturbed(), warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # colour-science tells everybody that it could plot, too
+        with hold_interrupts(), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # colour-science warns if it cannot plot, which nobody asks of it
             return importlib.import_module(module)
     except ImportError as error:
-        raise MissingDependencyError(f"{purpose}: expected {package}, found none; install sommerl[{extra}]") from error
+        raise MissingDependencyError(
+            f"{purpose}: {package} is needed and not installed; install sommerl[{extra}]"
+        ) from error

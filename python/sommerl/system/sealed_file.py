@@ -1,4 +1,6 @@
-"""What material files of our own share: how they begin, how they say that they are damaged, how their text is stored.
+"""The parts that our own file formats share: head, checksum, name and source, and compressed contents.
+
+A file is "sealed" if it begins with this head, whose checksum shows whether the rest is damaged:
 
     bytes  what
     4      magic
@@ -23,12 +25,12 @@ from .visible import visible
 
 PREFIX = struct.Struct("<4sHI")
 BYTE = struct.Struct("<B")
-LONGEST_NAME = 2**8 - 1
-DIGEST_BYTES = 32
+LONGEST_NAME = 2**8 - 1  # bytes in UTF-8: its length is stored in one byte
+DIGEST_BYTES = 32  # of a SHA-256
 
 
 class Named(Protocol):
-    """What files hold: a material, which has a name, and keeps the SHA-256 of its file."""
+    """A material that a file can hold: it has a name, and keeps the SHA-256 of the file that it was read from."""
 
     name: str
     file_sha256: str
@@ -38,12 +40,12 @@ Material = TypeVar("Material", bound=Named)
 
 
 def sealed(magic: bytes, version: int, body: bytes) -> bytes:
-    """A whole file around its body."""
+    """The bytes of a whole file: the head, then the body."""
     return PREFIX.pack(magic, version, zlib.crc32(body)) + body
 
 
 def write_sealed(out: BinaryIO, magic: bytes, version: int, parts: Sequence[Any]) -> None:
-    """Writes such a file around a body in parts, arrays among them, which are not copied."""
+    """Writes such a file. parts: of the body, in order: bytes or arrays, which are not copied."""
     crc = 0
     for part in parts:
         crc = zlib.crc32(part, crc)
@@ -53,13 +55,17 @@ def write_sealed(out: BinaryIO, magic: bytes, version: int, parts: Sequence[Any]
 
 
 def opened(data: bytes, magic: bytes, version: int, kind: str) -> Reader:
-    """A reader of the body. Raises FormatError for another kind of file, another version, or a damaged file."""
+    """Checks the head of a file's bytes, and returns a reader of its body.
+
+    kind: what the file should be, for the error message. Raises FormatError if the file is of another kind or version,
+    or damaged.
+    """
     check(zlib.crc32(memoryview(data)[PREFIX.size :]), data, magic, version, kind)
     return Reader(data, PREFIX.size)
 
 
 def check(crc: int, data: bytes, magic: bytes, version: int, kind: str) -> None:
-    """Raises FormatError as `opened` does. crc: of what comes after PREFIX, with which data begins."""
+    """Raises FormatError as `opened` does. data: begins with the head. crc: checksum of all bytes after the head."""
     if len(data) < PREFIX.size:
         raise FormatError(f"expected at least {PREFIX.size} bytes, found {len(data)}")
     found_magic, found_version, expected = PREFIX.unpack_from(data)
@@ -72,8 +78,11 @@ def check(crc: int, data: bytes, magic: bytes, version: int, kind: str) -> None:
         raise FormatError("expected the checksum in the file, found another: the file is damaged or cut off")
 
 
-def named(path: Path, data: bytes, decode: Callable[[bytes], Material]) -> Material:
-    """What `decode` makes of a file's bytes; its errors name the file."""
+def decode_file(path: Path, data: bytes, decode: Callable[[bytes], Material]) -> Material:
+    """The material that `decode` reads from the bytes of a file, with the SHA-256 of the file.
+
+    Raises FormatError, with the path of the file, for every error of `decode`.
+    """
     try:
         material = decode(data)
     except SommerlError as error:
@@ -84,7 +93,11 @@ def named(path: Path, data: bytes, decode: Callable[[bytes], Material]) -> Mater
 
 
 def origin(name: str, source_sha256: str) -> bytes:
-    """The name in UTF-8 and the SHA-256 of the source, each after its length; a source may have none."""
+    """The bytes of a name in UTF-8 and of a source's SHA-256, each after its length in one byte.
+
+    A name that is too long is cut off. source_sha256: 64 hexadecimal digits, or "" if there is none. Raises FormatError
+    for other text.
+    """
     text = name.encode("utf-8", "replace")[:LONGEST_NAME].decode("utf-8", "ignore").encode()
     try:
         digest = bytes.fromhex(source_sha256)
@@ -96,13 +109,16 @@ def origin(name: str, source_sha256: str) -> bytes:
 
 
 def deflated(payload: bytes) -> bytes:
-    """A deflate stream (RFC 1951, without zlib's head)."""
+    """Compresses to a deflate stream (RFC 1951, without zlib's head)."""
     packer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS, 9)
     return packer.compress(payload) + packer.flush()
 
 
 def inflated(compressed: bytes, expected: int) -> bytes:
-    """Exactly `expected` bytes, and never more than that in memory. Raises FormatError if that is not what there is."""
+    """Decompresses a deflate stream to exactly `expected` bytes; never takes more memory than that.
+
+    Raises FormatError if the stream is damaged, gives more or fewer bytes, or has other bytes after it.
+    """
     inflater = zlib.decompressobj(-zlib.MAX_WBITS)
     try:
         payload = inflater.decompress(compressed, expected)
@@ -116,7 +132,7 @@ def inflated(compressed: bytes, expected: int) -> bytes:
 
 
 class Reader:
-    """Bytes, one part after the other. Raises FormatError where there are too few."""
+    """Reads bytes one part after the other. Its methods raise FormatError if too few bytes are left."""
 
     def __init__(self, data: bytes, at: int) -> None:
         self._data, self._at = data, at
@@ -132,7 +148,7 @@ class Reader:
         return layout.unpack(self.take(layout.size))
 
     def origin(self) -> dict[str, str]:
-        """Name and digest, as `origin` wrote them."""
+        """The name and the source's SHA-256, as `origin` writes them."""
         try:
             name = self.take(*self.unpack(BYTE)).decode()
         except UnicodeDecodeError as error:

@@ -1,8 +1,8 @@
 """The limit on threads: SOMMERL_THREADS, or --threads of the command line. Everything that starts threads asks here.
 
-The core, SciPy and Dr.Jit are told when they are called. The pools of BLAS and OpenMP, which NumPy and others bring,
-read variables of their own when they are loaded: so these are set before this package imports NumPy. Where a program
-has imported it before, they are as they were.
+The core, SciPy and Dr.Jit get the limit when they are called. The thread pools of BLAS and OpenMP, which come with
+NumPy and others, read environment variables of their own when they are loaded, so these variables are set before this
+package imports NumPy. If a program has imported NumPy earlier, its pools keep the number of threads that they have.
 """
 
 from __future__ import annotations
@@ -16,30 +16,33 @@ from .errors import OptionError
 
 VARIABLE = "SOMMERL_THREADS"
 OPTION = "--threads"
-MOST = 256
+MOST = 256  # threads
 POOLS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
 def limit() -> int | None:
-    """The most threads that are to work at once; None if there is no limit. Raises OptionError for a wrong one."""
+    """The largest number of threads to use at once; None for no limit. Raises OptionError if the variable is wrong."""
     value = os.environ.get(VARIABLE, "")
     return checked(value, VARIABLE) if value else None
 
 
 def checked(value: str, name: str) -> int:
-    """A limit as it was typed. Raises OptionError, which names where it comes from."""
+    """The limit as a number. value: as typed. name: of the option or variable, for the error message.
+
+    Raises OptionError if it is not a whole number from 1 to MOST.
+    """
     if not (value.isascii() and value.isdigit() and len(value) < 9 and 1 <= int(value) <= MOST):
         raise OptionError(f"{name}: expected 1 to {MOST}, found {value}")
     return int(value)
 
 
 def use(threads: int) -> None:
-    """Sets the limit for this process and for those that it starts."""
+    """Sets the limit for this process and for processes that it starts."""
     os.environ[VARIABLE] = str(threads)
 
 
 def _prepare() -> None:
-    """Gives the pools that NumPy is about to start the limit, if there is one. A wrong one is told later."""
+    """Sets the variables of the thread pools, before NumPy is imported. Ignores a wrong limit: `limit` raises later."""
     try:
         threads = checked(_typed(sys.orig_argv) or os.environ.get(VARIABLE, ""), VARIABLE)
     except OptionError:
@@ -48,7 +51,7 @@ def _prepare() -> None:
 
 
 def _typed(line: Sequence[str]) -> str:
-    """The value of the option in a command line of ours; "" in others, and where it is not given."""
+    """The value of --threads in the command line of `sommerl`; "" if it is not given or another program is running."""
     program = [Path(word).stem for word in line[:4]]
     if "sommerl" not in program:
         return ""

@@ -1,1 +1,1 @@
-"""The preset compact: nodes fitted to a material, a palette for them, and a search for the size."""
+"""The preset `compact`: fits nodes to a material, makes a palette for them, and searches for a size or a quality."""

@@ -1,9 +1,11 @@
-"""A lattice fitted to a material: where its nodes go, and what they hold.
+"""Fits a lattice of nodes to a material: chooses where the nodes go, and which values they hold.
 
-The places are chosen axis by axis: dynamic programming finds, for each number of nodes, those between which straight
-lines are nearest to the material; a Lagrangian shares out a number of nodes among θ_h and, in bands of θ_h, θ_d and
-φ_d. The values are the weighted least squares of the interpolation to a million directions of the source, drawn toward
-the source's own values where directions are few.
+Places are chosen for one axis at a time. For each number of nodes on an axis, dynamic programming finds the places for
+which linear interpolation between the nodes has the least error. The total number of nodes is then divided among the
+axes (θ_h, and θ_d and φ_d of each band of rows) with a Lagrange multiplier, the price of a node.
+
+The values are a weighted least-squares fit of the interpolation to a million random directions of the source. A small
+ridge holds them to the source's own values at the nodes, which decides where there are few directions.
 """
 
 from __future__ import annotations
@@ -26,25 +28,52 @@ from .quantise import Problem
 Array = NDArray[np.float64]
 Choices = dict[int, tuple[list[int], float]]  #: for each number of nodes: their places, and the error left
 
-BANDS = 6
+# The measurements below are changes of the final error of nickel (SGD) and irid_flake_paint1 (RGL) in 2,700 bytes.
+
+# Numbers of nodes
+SMALLEST, LARGEST = 100, 100_000  # a file holds 131,072 at most (docs/format.md)
+BANDS = 6  # 3, 4 and 9 are within 0.5 dB (docs/method.md)
+# Of rows, and of nodes on an axis of a band. They bound the work; chrome comes to them from 42,000 nodes on.
 MOST_ROWS, MOST_NODES = 90, 44
-DIRECTIONS = 1_000_000
-LINES = 500  # along which the error of an axis is measured
-RIDGE = 0.05
-MEASURE_POWER = 0.5  # of solid angle times cosines, as a weight: between the sphere's and the cells' own
-SMALLEST, LARGEST = 100, 100_000  # nodes
+FEWEST_ROWS = 5  # fewer than are ever chosen: the smallest lattices have 8 (beige-fabric) to 19 rows (chrome)
+LEAST_SHARE = 0.8  # of the nodes asked for; 0.5 and 0.95 give the same lattices
+
+# The lines along an axis on which its errors are measured, in steps of the fine grid from one to the next
+ROWS_EVERY_D, ROWS_EVERY_P = 3.0, 4.0  # along θ_h, in θ_d and φ_d: at most 2,745 lines,
+LINES = 500  # of which this many are drawn at random; 100 cost 0.2 and 0.8 dB
+BAND_ROWS = 10  # along θ_d and φ_d: in this many rows of a band,
+THETA_D_EVERY_P = 9.0  # along θ_d, in φ_d: 200 lines
+PHI_D_EVERY_D = 6.0  # along φ_d, in θ_d: 310 lines
+ROWS_FOR_BANDS = 20  # in the best lattice of this many rows, all bands have about equally many
+
+# The price of a node, by bisection
+PRICES = -13.0, 3.0  # decades, in units of the error left with FEWEST_ROWS rows: from almost free to far too dear
+BISECTIONS = 20  # 12 give the same lattices
+UNKNOWN = 1e30  # stands for the error of numbers of nodes that were not examined: more than any error
+
+# The least squares
+DIRECTIONS = 1_000_000  # ten for each node of the largest lattice
+MEASURE_POWER = 0.5  # weights are solid angle times cosines to this power; 0.35 and 0.7 are no better (docs/method.md)
+LOWEST_COSINE = 1e-4  # closer to the horizon, no directions are drawn: f_r may have no bound there
+RIDGE = 0.05  # of the median of the matrix's diagonal; 0.5 costs 0.5 and 1.3 dB, 0.005 gains 0.5 and 0.7 dB
+# Of the conjugate gradients. They converge in fewer than 50 iterations; a tolerance of 10⁻³ costs the fit 2.4 dB.
+MOST_ITERATIONS, TOLERANCE = 200, 1e-5
 
 
 @dataclass(frozen=True)
 class _Grid:
-    """A material at the crossings of three axes of the fine grid: y (h, d, p, 3) and weights (h, d, p)."""
+    """A material on a part of the fine grid, given by three axes: y of shape (h, d, p, 3), and weights (h, d, p)."""
 
     y: Array
     weight: Array
 
 
 class Fitter:
-    """A material, prepared for lattices of any size. Raises MissingDependencyError without SciPy."""
+    """Prepares a material once, and then fits lattices of any size to it.
+
+    seed: of the lines and directions that are drawn. Raises MissingDependencyError without SciPy, and MaterialError for
+    a black material.
+    """
 
     def __init__(self, brdf: Brdf, *, seed: int = 0) -> None:
         self._brdf = brdf
@@ -52,18 +81,19 @@ class Fitter:
             optional(module, "SciPy", "fitting", "formats") for module in ("scipy.sparse", "scipy.sparse.linalg")
         )
         self._random = np.random.Generator(np.random.PCG64(seed))
-        axes = np.arange(FINE + 1.0), np.arange(0.0, FINE + 1, 3.0), np.arange(0.0, FINE, 4.0)
+        axes = np.arange(FINE + 1.0), np.arange(0.0, FINE + 1, ROWS_EVERY_D), np.arange(0.0, FINE, ROWS_EVERY_P)
         wi, wo, f_damped = self._source(*axes)
         seen = np.minimum(wi[2], wo[2]) > SMALLEST_COSINE
         values = f_damped[seen]
         if not values.any():
-            raise MaterialError(f"{brdf.name}: expected a positive reflectance in some direction, found none")
-        # The median; of a mirror, or of one pure colour, that of what is not black. As a file holds it.
+            raise MaterialError(f"{brdf.name}: it cannot be compressed, since it is black")
+        # The median, or that of the positive values where more than half are 0 (a mirror, a pure colour). In single
+        # precision, as a file stores it.
         median = np.median(values) or np.median(values[values > 0])
         self.scale = float(np.float32(median))
         grid = self._scaled(*axes, wi, wo, f_damped)
         self._rows = best_nodes(line_errors(grid.y, grid.weight, 0, self._random), MOST_ROWS)
-        some = self._rows[20][0]
+        some = self._rows[ROWS_FOR_BANDS][0]
         starts = sorted({0, *(int(some[len(some) * g // BANDS]) for g in range(1, BANDS))})
         self._edges = [*starts, FINE + 1]
         self._theta_d: list[Choices] = []
@@ -75,29 +105,37 @@ class Fitter:
         self._samples()
 
     def fit(self, nodes: int) -> FittedTable:
-        """The material on so many nodes or a few less. Raises MaterialError for a number out of range."""
+        """The material, not quantised, on a lattice of at most `nodes` nodes (and at least LEAST_SHARE of them).
+
+        Raises MaterialError if `nodes` is not from SMALLEST to LARGEST.
+        """
         problem = self.problem(nodes)
         return FittedTable(problem.lattice, problem.best, self.scale, name=self._brdf.name)
 
     def problem(self, nodes: int) -> Problem:
-        """The least squares of the material on so many nodes or a few less, solved."""
+        """The least-squares problem on such a lattice, with its solution. Raises MaterialError as `fit` does."""
         if not SMALLEST <= nodes <= LARGEST:
             raise MaterialError(f"nodes: expected {SMALLEST} to {LARGEST}, found {nodes}")
         return self._solved(self._lattice(nodes))
 
     def _band(self, low: int, high: int) -> tuple[Choices, Choices]:
-        """Nodes in θ_d and in φ_d for the rows from `low` to `high`; errors as those of all rows of the fine grid."""
-        rows = np.unique(np.linspace(low, high, 10).astype(int)).astype(np.float64)
-        thinned = (high - low + 1) / len(rows)
-        grid = self._grid(rows, np.arange(FINE + 1.0), np.arange(0.0, FINE, 9.0))
-        theta_d = best_nodes(thinned * 9 / 12 * line_errors(grid.y, grid.weight, 1, self._random), MOST_NODES)
-        grid = self._grid(rows, np.arange(0.0, FINE + 1, 6.0), np.arange(float(FINE)))
+        """The best nodes in θ_d and in φ_d for a band: the rows of the fine grid from `low` to `high`.
+
+        Errors are measured on fewer lines than those of θ_h, and are scaled up to be comparable with them.
+        """
+        rows = np.unique(np.linspace(low, high, BAND_ROWS).astype(int)).astype(np.float64)
+        thinned, a_line = (high - low + 1) / len(rows), ROWS_EVERY_D * ROWS_EVERY_P
+        grid = self._grid(rows, np.arange(FINE + 1.0), np.arange(0.0, FINE, THETA_D_EVERY_P))
+        errors = line_errors(grid.y, grid.weight, 1, self._random)
+        theta_d = best_nodes(thinned * THETA_D_EVERY_P / a_line * errors, MOST_NODES)
+        grid = self._grid(rows, np.arange(0.0, FINE + 1, PHI_D_EVERY_D), np.arange(float(FINE)))
         y, weight = (np.concatenate([part, part[:, :, :1]], axis=2) for part in (grid.y, grid.weight))
-        found = best_nodes(thinned * 6 / 12 * line_errors(y, weight, 2, self._random), MOST_NODES + 1)
+        errors = line_errors(y, weight, 2, self._random)
+        found = best_nodes(thinned * PHI_D_EVERY_D / a_line * errors, MOST_NODES + 1)
         return theta_d, {count - 1: (nodes[:-1], error) for count, (nodes, error) in found.items()}
 
     def _source(self, x: Array, y: Array, z: Array) -> tuple[Triple, Triple, Array]:
-        """Directions at the crossings of axes, and f_r times `damped` there; 0 near and below the horizon."""
+        """The directions at all points of three axes, and f_r times `damped` there; 0 near and below the horizon."""
         wi, wo = directions(*angles_at(*np.meshgrid(x, y, z, indexing="ij")))
         f_r = np.zeros((*wi[0].shape, 3))
         seen = np.minimum(wi[2], wo[2]) > SMALLEST_COSINE
@@ -110,16 +148,16 @@ class Fitter:
     def _scaled(self, x: Array, y: Array, z: Array, wi: Triple, wo: Triple, f_damped: Array) -> _Grid:
         values = np.cbrt(f_damped / self.scale)
         seen = np.minimum(wi[2], wo[2]) > SMALLEST_COSINE
-        for j in range(1, len(y)):  # below the horizon, as at the last node above it
+        for j in range(1, len(y)):  # below the horizon, the value of the last point above it in θ_d
             values[:, j] = np.where(seen[:, j, :, None], values[:, j], values[:, j - 1])
         return _Grid(values, _measure(*np.meshgrid(x, y, z, indexing="ij"), wi, wo) ** MEASURE_POWER * seen)
 
     def _samples(self) -> None:
-        """Random directions, evenly over the fine grid, and the source there."""
+        """Draws random directions, uniform over the fine grid, and evaluates the source there."""
         x = (np.arange(DIRECTIONS) + self._random.random(DIRECTIONS)) * (FINE / DIRECTIONS)
         y, z = self._random.random((2, DIRECTIONS)) * FINE
         wi, wo = directions(*angles_at(x, y, z))
-        above = np.minimum(wi[2], wo[2]) > 1e-4
+        above = np.minimum(wi[2], wo[2]) > LOWEST_COSINE
         self._places = x[above], y[above], z[above]
         wi, wo = ((w[0][above], w[1][above], w[2][above]) for w in (wi, wo))
         f_r = self._brdf.eval_both_orders(np.stack(wi, axis=-1), np.stack(wo, axis=-1))
@@ -128,7 +166,11 @@ class Fitter:
         self._weights = weight / weight.mean()
 
     def _lattice(self, nodes: int) -> NodeLattice:
-        """Of all numbers of rows, and of nodes in each band's axes, those of the least error at so many nodes."""
+        """The lattice of the least error among those with LEAST_SHARE · nodes to `nodes` nodes.
+
+        For each number of rows, the price of a node is found by bisection: at each price, every band takes the numbers
+        of nodes in θ_d and φ_d that minimise its error plus the price of its nodes.
+        """
         costs = [
             _costs(theta_d)[:, None] + _costs(phi_d) for theta_d, phi_d in zip(self._theta_d, self._phi_d, strict=True)
         ]
@@ -137,20 +179,20 @@ class Fitter:
         best: tuple[float, int, list[tuple[int, int]]] | None = None
         for rows, (places, error) in self._rows.items():
             share = np.histogram(places, bins=np.array(self._edges) - 0.5)[0]
-            low, high = -13.0, 3.0
-            for _ in range(20 if rows >= 5 else 0):
-                price = self._rows[5][1] * 10 ** ((low + high) / 2)
+            low, high = PRICES
+            for _ in range(BISECTIONS if rows >= FEWEST_ROWS else 0):
+                price = self._rows[FEWEST_ROWS][1] * 10 ** ((low + high) / 2)
                 picked = [
                     np.unravel_index(int((c + price * n * product).argmin()), c.shape)
                     for c, n in zip(costs, share, strict=True)
                 ]
                 total = sum(int(n * product[at]) for n, at in zip(share, picked, strict=True))
                 left = error + sum(float(c[at]) for c, n, at in zip(costs, share, picked, strict=True) if n)
-                if 0.8 * nodes <= total <= nodes and (best is None or left < best[0]):
+                if LEAST_SHARE * nodes <= total <= nodes and (best is None or left < best[0]):
                     best = left, rows, [(int(i) + 1, int(j) + 1) for i, j in picked]
                 low, high = ((low + high) / 2, high) if total > nodes else (low, (low + high) / 2)
         if best is None:
-            raise MaterialError(f"{self._brdf.name}: expected a lattice of about {nodes} nodes, found none")
+            raise MaterialError(f"{self._brdf.name}: no lattice of about {nodes} nodes was found for it")
         _, rows, counts = best
         places = self._rows[rows][0]
         bands = [bisect_right(self._edges, place) - 1 for place in places]
@@ -163,7 +205,7 @@ class Fitter:
         )
 
     def _solved(self, lattice: NodeLattice) -> Problem:
-        """Least squares of the interpolation at the samples, by conjugate gradients."""
+        """Solves the least-squares problem of a lattice at the random directions, by conjugate gradients."""
         corners = lattice.corners(*self._places, lattice.buffers())
         nodes, weights = (np.stack([corner[k] for corner in corners], axis=-1) for k in (0, 1))
         count = len(nodes)
@@ -185,7 +227,9 @@ class Fitter:
         right = weighted.T @ self._targets + ridge * sampled
         scaled = self._sparse.diags_array(1 / system.diagonal())
         columns: list[Array] = [
-            self._solvers.cg(system, right[:, c], x0=sampled[:, c], M=scaled, maxiter=200, rtol=1e-5)[0]
+            self._solvers.cg(system, right[:, c], x0=sampled[:, c], M=scaled, maxiter=MOST_ITERATIONS, rtol=TOLERANCE)[
+                0
+            ]
             for c in range(3)
         ]
         best = np.stack(columns, axis=-1)
@@ -194,10 +238,11 @@ class Fitter:
 
 
 def line_errors(y: Array, weight: Array, axis: int, random: np.random.Generator) -> Array:
-    """What is lost if only two places along an axis are kept and a straight line is drawn between them.
+    """The error of linear interpolation between each two places on an axis.
 
-    y: (…, 3) and weights (…) of a grid. Returns (n, n): the weighted squared error at the places between i and j, over
-    the grid's lines along the axis (estimated from LINES of them), infinite unless i < j.
+    y: (…, 3) and weight: (…), values and weights on a grid. Returns (n, n) for the n places on the axis: at [i, j], the
+    weighted squared error at all places between i and j, summed over the grid's lines along the axis (estimated from
+    LINES of them); infinite unless i < j.
     """
     n = int(y.shape[axis])
     y, weight = np.moveaxis(y, axis, 0).reshape(n, -1, 3), np.moveaxis(weight, axis, 0).reshape(n, -1)
@@ -205,7 +250,7 @@ def line_errors(y: Array, weight: Array, axis: int, random: np.random.Generator)
     chosen = random.permutation(lines)[:LINES]
     y, weight = y[:, chosen], weight[:, chosen]
     x = np.arange(n, dtype=np.float64)
-    # Sums over the places before k of w xᵐ, w y xᵐ and w y²: any stretch between two places is then a difference.
+    # Cumulative sums of w xᵐ, w y xᵐ and w y²: the sum over any stretch of places is a difference of two of them.
     w = [_before(weight * x[:, None] ** m) for m in (0, 1, 2)]
     s = [_before(weight[..., None] * y * x[:, None, None] ** m) for m in (0, 1)]
     q = _before((weight[..., None] * y**2).sum(axis=-1))
@@ -225,7 +270,10 @@ def line_errors(y: Array, weight: Array, axis: int, random: np.random.Generator)
 
 
 def best_nodes(errors: Array, most: int) -> Choices:
-    """For each number of nodes from 2 to `most`, the places from first to last with the least sum of errors."""
+    """For each number of nodes from 2 to `most`, the places with the least sum of errors, by dynamic programming.
+
+    errors: (n, n), as from `line_errors`. The first and the last place are always among the nodes.
+    """
     best = np.full(len(errors), np.inf)
     best[0] = 0.0
     before: list[NDArray[np.intp]] = []
@@ -243,16 +291,17 @@ def best_nodes(errors: Array, most: int) -> Choices:
 
 
 def _before(terms: Array) -> Array:
+    """Cumulative sums along the first axis: at k, of the terms before k."""
     return np.concatenate([np.zeros((1, *terms.shape[1:])), np.cumsum(terms, axis=0)])
 
 
 def _costs(choices: Choices) -> Array:
-    """The error left with 1, 2, … nodes; beyond what is known, too large."""
-    return np.array([choices[count][1] if count in choices else 1e30 for count in range(1, MOST_NODES + 1)])
+    """The error left with 1, 2, … MOST_NODES nodes; UNKNOWN for numbers without a choice."""
+    return np.array([choices[count][1] if count in choices else UNKNOWN for count in range(1, MOST_NODES + 1)])
 
 
 def _measure(x: Array, y: Array, z: Array, wi: Triple, wo: Triple) -> Array:
-    """dω_i dω_o cos θ_i cos θ_o of a step of the fine grid, up to a factor."""
+    """dω_i dω_o cos θ_i cos θ_o of one step of the fine grid, up to a constant factor."""
     theta_h, theta_d, _ = angles_at(x, y, z)
     steps = np.where(x < KNEE, 1 / BELOW, 1 / ABOVE)
     solid = np.sqrt(theta_h) * np.sin(theta_h) * np.sin(theta_d) * np.cos(theta_d) * steps

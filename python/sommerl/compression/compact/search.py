@@ -1,7 +1,7 @@
-"""The preset `compact`: chooses lattice, palettes and the price of a bit for a size or for a quality.
+"""The preset `compact`: searches for the best material of a given size, or the smallest of a given quality.
 
-What quality means is handed in: the command line gives the PSNR of a rendered sphere. Without it, the error of the
-least squares decides between candidates of one size.
+Quality is measured by a function that the caller passes; the command line passes the PSNR of a rendered sphere. Without
+one, candidates of the same size are compared by their least-squares error.
 """
 
 from __future__ import annotations
@@ -28,15 +28,24 @@ from .quantise import quantise
 Quality = Callable[[SomManBrdf], float]  #: of a candidate, in decibels
 Progress = Callable[[int, int], None]  #: steps done, steps in all
 
-DEFAULT_PSNR = 48.0  # dB
-SMALLEST_SIZE, LARGEST_SIZE = 300, 64_000  # bytes
-LOWEST_PSNR, HIGHEST_PSNR = 20.0, 80.0
-SLOPE = 2.4  # dB for each doubling of the size: only a first guess
-CLOSE = 1.04  # sizes nearer to each other than that are not told apart
-MOST_TRIES = 7
-SPREAD = (1.0, 0.8, 1.2)  # of the number of nodes that is usual for a size
+DEFAULT_PSNR = 48.0  # dB: a little more than the preset `paper` reaches on RGL's materials (docs/method.md)
+SMALLEST_SIZE, LARGEST_SIZE = 300, 64_000  # bytes: readers have to accept what is written (docs/format.md)
+LOWEST_PSNR, HIGHEST_PSNR = 20.0, 80.0  # dB: at 80, one 8-bit value in 1,500 differs by 1
 
-# Bytes, and the nodes that are usually best for them.
+# The search for a quality
+FIRST_SIZE = 2000.0  # bytes: of RGL's seven materials, four reach DEFAULT_PSNR with 1,000 bytes, six with 2,700
+SLOPE = (
+    2.4  # dB for each doubling of the size, to guess the next size; a little more than usual, so that steps are small
+)
+MARGIN = 0.1  # dB: the guess aims at this much more than what is wanted
+INNER = 0.2, 0.8  # the guess stays between these places in the range that is left, so each candidate narrows it
+MOST_TRIES = 7
+CLOSE = 1.04  # the ratio of sizes at which the search ends: what seven bisections of the whole range lead to
+
+# The search for the best material of a size
+SPREAD = (1.0, 0.8, 1.2)  # numbers of nodes that are tried, in units of the usual number
+# Bytes, and the numbers of nodes that are usually best for them. With 0.6 times as many in 2,700 bytes, RGL's
+# irid_flake_paint1 loses 1.5 dB.
 USUAL = (
     (300, 350),
     (500, 700),
@@ -47,16 +56,20 @@ USUAL = (
     (32_000, 42_000),
     (64_000, 75_000),
 )
-GAINS, SHAPES = 3.4, 2.6  # entries for the square root of a node
-MOST_ENTRIES = 1024
+
+# Entries of a palette, in units of the square root of the number of nodes. In 2,700 bytes, 0.7 times as many cost 0.1
+# to 1.5 dB, and 1.4 times as many gain at most 0.2 dB (nickel, irid_flake_paint1).
+GAINS, SHAPES = 3.4, 2.6
+MOST_ENTRIES = 1024  # of a palette in a file (docs/format.md)
 
 
 @dataclass(frozen=True)
 class CompactOptions:
-    """What is asked for: the best material of at most `target_size` bytes, or the smallest of at least `target_psnr`
-    dB; DEFAULT_PSNR if neither is given. seed: of directions, first weights and order.
+    """What to search for: the best material of at most `target_size` bytes, or the smallest of at least `target_psnr`
+    dB. If neither is given, target_psnr is DEFAULT_PSNR.
 
-    Raises OptionError for values that cannot be met by any material.
+    seed: of the random directions, and of the SOM's first weights and order of presentation.
+    Raises OptionError for values out of range, and if both targets are given.
     """
 
     target_size: int | None = None
@@ -65,13 +78,13 @@ class CompactOptions:
 
     def __post_init__(self) -> None:
         if self.target_size is not None and self.target_psnr is not None:
-            raise OptionError("target: expected a size or a PSNR, found both")
+            raise OptionError("target: a size and a PSNR cannot both be asked for; give one of them")
         try:
             object.__setattr__(self, "seed", index(self.seed))
             if self.target_size is not None:
                 object.__setattr__(self, "target_size", index(self.target_size))
         except TypeError as error:
-            raise OptionError(f"target_size, seed: expected whole numbers, found others ({error})") from error
+            raise OptionError(f"target_size, seed: they have to be whole numbers ({error})") from error
         if self.target_size is not None and not SMALLEST_SIZE <= self.target_size <= LARGEST_SIZE:
             raise OptionError(f"target_size: expected {SMALLEST_SIZE} to {LARGEST_SIZE}, found {self.target_size}")
         psnr = self.target_psnr
@@ -85,9 +98,10 @@ class CompactOptions:
 
 @dataclass(frozen=True)
 class CompactReport:
-    """How it went. psnr_db: of the result, None if no quality was handed in. seconds: wall-clock time.
+    """How the search went.
 
-    tried: bytes, nodes, and quality (or minus the error) of each candidate.
+    psnr_db: the quality of the result; None if no quality function was passed. seconds: wall-clock time.
+    tried: for each candidate its bytes, its nodes, and its quality [dB] (or minus its error).
     """
 
     psnr_db: float | None
@@ -96,9 +110,9 @@ class CompactReport:
 
 
 class Compressor:
-    """A source, prepared once: compact materials of any size or quality.
+    """Prepares a source once, and then makes compact materials of any size or quality from it.
 
-    quality: what is measured of candidates, and decides between them; without it, the error of the least squares does.
+    quality: gives a candidate's quality [dB]; if None, minus the least-squares error is used.
     step: called after the preparation and after each candidate.
     Raises MissingDependencyError without SciPy.
     """
@@ -114,20 +128,25 @@ class Compressor:
         self._step()
 
     def of_size(self, size: int) -> tuple[float, SomManBrdf]:
-        """The best of several lattices in at most so many bytes, and its quality.
+        """The best material of at most `size` bytes among one for each of SPREAD, and its quality.
 
         Raises MaterialError if none of them is small enough.
         """
         best = max((self._candidate(size, spread) for spread in SPREAD), key=lambda each: each[0])
         if best[0] == -math.inf:
             least = min(tried[0] for tried in self.tried)
-            raise MaterialError(f"{self._brdf.name}: expected a file of {size} bytes, found none below {least}")
+            raise MaterialError(
+                f"{self._brdf.name}: it cannot be compressed to {size} bytes; the smallest file found has {least} bytes"
+            )
         return best
 
     def of_quality(self, wanted: float) -> tuple[float, SomManBrdf]:
-        """The smallest material that is good enough, as far as MOST_TRIES find it. Raises MaterialError if none is."""
+        """The smallest material of at least the quality `wanted` [dB] that MOST_TRIES candidates find, and its quality.
+
+        Raises MaterialError if none of them is good enough.
+        """
         low, high = float(SMALLEST_SIZE), float(LARGEST_SIZE)
-        size, best, reached = 2000.0, None, -math.inf
+        size, best, reached = FIRST_SIZE, None, -math.inf
         for tries_left in reversed(range(MOST_TRIES)):
             quality, material = self._candidate(int(size), 1.0)
             reached = max(reached, quality)
@@ -137,24 +156,32 @@ class Compressor:
                 low = size
             if high / low < CLOSE:
                 break
-            guess = size * 2 ** ((wanted - quality + 0.1) / SLOPE)
-            size = min(max(guess, low * (high / low) ** 0.2), low * (high / low) ** 0.8)
+            guess = size * 2 ** ((wanted - quality + MARGIN) / SLOPE)
+            inner_low, inner_high = (low * (high / low) ** share for share in INNER)
+            size = min(max(guess, inner_low), inner_high)
             if best is None and (guess >= LARGEST_SIZE or tries_left == 1):
                 size = float(LARGEST_SIZE)
         if best is None:
-            found = f"{reached:.1f} dB with {LARGEST_SIZE} bytes"
-            raise MaterialError(f"{self._brdf.name}: expected at least {wanted:g} dB, found no more than {found}")
+            raise MaterialError(
+                f"{self._brdf.name}: it cannot be compressed with {wanted:g} dB; the best file found has "
+                f"{reached:.1f} dB with {LARGEST_SIZE} bytes"
+            )
         return best
 
     def _candidate(self, size: int, spread: float) -> tuple[float, SomManBrdf]:
-        """A material of at most so many bytes, with more or fewer nodes than usual; -inf if it is larger."""
+        """A material for a size, with `spread` times the usual number of nodes, and its quality.
+
+        The quality is -inf if the material came out larger than `size` bytes.
+        """
         nodes = int(np.clip(spread * usual_nodes(size), SMALLEST, LARGEST))
         problem = self._fitter.problem(nodes)
         gains, shapes = (min(MOST_ENTRIES, round(share * math.sqrt(nodes))) for share in (GAINS, SHAPES))
         head = file.head_bytes(self._brdf.name, self._source)
-        if size < 2 * head:
-            expected = f"a size of at least {2 * head} bytes, twice what its name and source take"
-            raise MaterialError(f"{self._brdf.name}: expected {expected}, found {size}")
+        if size < 2 * head:  # less than half of the file would be left for the material
+            raise MaterialError(
+                f"{self._brdf.name}: its name and source take {head} bytes of the {size} asked for; ask for at least "
+                f"{2 * head} bytes"
+            )
         found, stream = quantise(problem, gains, shapes, size - head, seed=self._seed)
         material = SomManBrdf(
             GainsAndShapes(gain_values(found.gains), shape_values(found.shapes), self._fitter.scale),
@@ -165,7 +192,7 @@ class Compressor:
             made_from=self._source.made_from,
         )
         error = problem.error + problem.excess(found.values())
-        # Rounded, so that the last bits of a machine's sums do not decide.
+        # Rounded, so that rounding errors, which differ between machines, do not decide between candidates.
         quality = round(self._quality(material), 3) if self._quality else -error
         written = head + len(stream)
         self.tried.append((written, problem.lattice.size, quality))
@@ -180,14 +207,16 @@ def compress(
     quality: Quality | None = None,
     progress: Progress | None = None,
 ) -> tuple[SomManBrdf, CompactReport]:
-    """Compresses any BRDF into a compact material.
+    """Compresses any BRDF into a compact material; returns it with a report.
 
-    quality: what `target_psnr` is about, and how candidates of one size are judged. Raises OptionError if a PSNR is
-    asked for without it, MaterialError if the target cannot be met, MissingDependencyError without SciPy.
+    quality: gives a candidate's quality [dB], which `target_psnr` refers to, and by which candidates of the same size
+    are compared. progress: called with the steps done and the steps in all.
+    Raises OptionError if a PSNR is asked for without `quality`, MaterialError if the target cannot be met, and
+    MissingDependencyError without SciPy.
     """
     options = options or CompactOptions()
     if options.target_psnr is not None and quality is None:
-        raise OptionError("target_psnr: expected a function that measures it, found none")
+        raise OptionError("target_psnr: a function that measures the quality is needed; pass one as `quality`")
     started = time.perf_counter()
     steps, done = 1 + (len(SPREAD) if options.target_size is not None else MOST_TRIES), 0
 
@@ -209,6 +238,6 @@ def compress(
 
 
 def usual_nodes(size: int) -> int:
-    """The number of nodes that is usually best for so many bytes."""
+    """The number of nodes that is usually best for a file of `size` bytes: USUAL, interpolated in logarithms."""
     bytes_, nodes = (np.log(np.array(column, np.float64)) for column in zip(*USUAL, strict=True))
     return round(float(np.exp(np.interp(math.log(size), bytes_, nodes))))

@@ -1,1 +1,1 @@
-"""The format .smrl: its writer, its reader, and decoders to read and compare."""
+"""The file format .smrl: writer and reader, and a second decoder in plain Python that serves as the specification."""

@@ -1,4 +1,4 @@
-"""Material files (.smrl), format 1: docs/format.md has every byte, `reference_codec.py` reads nodes in plain Python.
+"""Writes and reads material files (.smrl), format 1. docs/format.md specifies every byte.
 
     bytes  what
     4      "SMRL"
@@ -7,8 +7,8 @@
     1      kind: 0 for cells (the preset `paper`), 1 for nodes (`compact`)
     1, …   length of the name, and the name in UTF-8
     1, …   32 and the SHA-256 of the source, or 0
-    2, …   length of the notes, and notes: JSON in UTF-8, with options and metrics; or 0
-    …      cells: lattice, interpolation, number of LUT entries, and a deflate stream of LUT and indices
+    2, …   length of the notes, and the notes: JSON in UTF-8, with options and metrics; or 0
+    …      cells: lattice, lookup, number of LUT entries, and a deflate stream of LUT and index
            nodes: scale, and a stream of lattice, palette and indices
 
 All numbers are little-endian.
@@ -44,27 +44,28 @@ SHORT = struct.Struct("<H")
 CELLS, NODES = 0, 1
 CELLS_HEAD = struct.Struct("<HHHBBI")
 NODES_HEAD = struct.Struct("<f")
-MOST_BINS = 2**16 - 1  # on an axis
-MOST_CELLS = 2**22  # MERL's larger kind of table has 2,916,000
+MOST_BINS = 2**16 - 1  # on an axis: stored in two bytes
+MOST_CELLS = 2**22  # enough for MERL's larger kind of table, which has 2,916,000
+# The largest index and the largest LUT, not compressed, and room for the rest.
 LONGEST_FILE = 2 * MOST_CELLS + 24 * 2**16 + 2**20
-LONGEST_NOTES = 2**16 - 1
+LONGEST_NOTES = 2**16 - 1  # bytes: their length is stored in two bytes
 
 
 def looks_like(head: bytes) -> bool:
-    """Whether a file that starts with these bytes says that it is a material file."""
+    """Whether a file that begins with these bytes is a material file, by its magic number."""
     return head.startswith(MAGIC)
 
 
 def save(material: SomManBrdf, path: str | Path) -> int:
     """Writes a material file (.smrl); returns its length [bytes].
 
-    Raises FormatError for what `load` would refuse, MaterialError for what is not compressed, OptionError for a name
-    with another extension.
+    Raises FormatError for a material that `load` would refuse, MaterialError if `material` is not a compressed one,
+    OptionError if the name does not end in .smrl, OSError if the file cannot be written.
     """
     if not isinstance(material, SomManBrdf):  # pyright: ignore[reportUnnecessaryIsInstance]
         name = getattr(material, "name", "material")
         raise MaterialError(
-            f"{name}: expected a compressed material, found {type(material).__name__}; sommerl.train makes one of it"
+            f"{name}: expected a compressed material, found {type(material).__name__}; sommerl.train compresses it"
         )
     if Path(path).suffix.lower() != ".smrl":
         raise OptionError(f"{path}: expected a name that ends in .smrl, found {Path(path).suffix!r}")
@@ -76,17 +77,17 @@ def save(material: SomManBrdf, path: str | Path) -> int:
 
 
 def load(path: str | Path) -> SomManBrdf:
-    """The material in a file. Raises FormatError if it is not one, or is damaged, or is of another version."""
+    """Reads a material file. Raises FormatError if it is of another kind or version, or damaged."""
     return parse(Path(path), door.read(path, LONGEST_FILE))
 
 
 def parse(path: Path, data: bytes) -> SomManBrdf:
-    """The same of a file's bytes."""
-    return sealed_file.named(path, data, decode)
+    """The same from the bytes of a file. path: for error messages."""
+    return sealed_file.decode_file(path, data, decode)
 
 
 def encode(material: SomManBrdf) -> bytes:
-    """The bytes of a material file. The same material always gives the same bytes."""
+    """The bytes of a material's file; always the same for the same material. Raises FormatError as `save` does."""
     noted = _noted(material)
     kind, contents = (NODES, _nodes(material)) if material.grid is None else (CELLS, _cells(material, material.grid))
     body = _head(kind, material.name, material.source.sha256, noted) + contents
@@ -94,11 +95,12 @@ def encode(material: SomManBrdf) -> bytes:
 
 
 def _noted(material: SomManBrdf) -> bytes:
+    """The bytes of a material's notes."""
     return notes.written(made_from=list(material.source.made_from), metrics=material.metrics, options=material.options)
 
 
 def head_bytes(name: str, source: Source) -> int:
-    """What a file of nodes holds before the stream [bytes]."""
+    """The length of a compact material's file before its stream [bytes]."""
     head = _head(NODES, name, source.sha256, notes.written(made_from=list(source.made_from)))
     return sealed_file.PREFIX.size + len(head) + NODES_HEAD.size
 
@@ -110,7 +112,7 @@ def _head(kind: int, name: str, source_sha256: str, noted: bytes) -> bytes:
 
 
 def decode(data: bytes) -> SomManBrdf:
-    """The material in the bytes of a file. Raises FormatError."""
+    """Reads a material from the bytes of a file. Raises FormatError if they are not a valid file."""
     reader = sealed_file.opened(data, MAGIC, VERSION, "material file (.smrl)")
     try:
         return _material(reader)

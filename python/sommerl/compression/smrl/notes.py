@@ -1,7 +1,7 @@
-"""What a material file notes of how it was made: options and metrics, each under its name, of plain values.
+"""The notes of a material file: the options it was made with, its metrics, and the sources it was made from.
 
-Whatever is read is shown to people, and some of it is calculated with: so the types are checked when a file is read,
-and before one is written. docs/format.md lists the names that have a meaning, and says how others may join.
+Notes are shown to people, and some are used in calculations, so names and types are checked when a file is read and
+before one is written. docs/format.md lists the names that have a meaning; others are allowed.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from ...system.errors import FormatError
 Notes = dict[str, Any]
 
 LONGEST_NAME, LONGEST_TEXT, MOST, LARGEST = 100, 1000, 64, 1e300
-FACTS = "source_facts"  # among the options: what was reported of the source, by the name of the fact
+FACTS = "source_facts"  # the option that holds what was reported about the source (`Brdf.facts`)
 NUMBER, WHOLE, FLAG, TEXT = "a number", "a whole number", "true or false", "a text"
 PLAIN = f"a number, true, false, null or a text of at most {LONGEST_TEXT} characters"
 EACH = f"at most {MOST} names of at most {LONGEST_NAME} characters, each with {PLAIN}"
-DEEPEST = 32  # objects and lists within each other
+DEEPEST = 32  # levels of objects and lists within each other
 KNOWN: dict[str, dict[str, str]] = {
     "options": {
         **dict.fromkeys(("clusters", "epochs", "seed"), WHOLE),
@@ -40,7 +40,7 @@ KNOWN: dict[str, dict[str, str]] = {
 
 
 def written(**known: Any) -> bytes:
-    """What there is to say, for a file. Raises FormatError for what JSON cannot hold; for the rest, see `parsed`."""
+    """The bytes of notes, without empty ones. Raises FormatError for values that JSON cannot hold; checks no names."""
     said = {key: value for key, value in known.items() if value}
     if not said:
         return b""
@@ -52,7 +52,10 @@ def written(**known: Any) -> bytes:
 
 
 def parsed(data: bytes) -> dict[str, Any]:
-    """Options, metrics and the chain of sources, from a file's bytes. Raises FormatError."""
+    """Options, metrics and the chain of sources from the bytes of a file's notes.
+
+    Raises FormatError if they are not JSON, too deep, or not as docs/format.md says.
+    """
     try:
         said = json.loads(data.decode() or "{}", parse_int=_finite, parse_float=_finite, parse_constant=_finite)
     except (ValueError, RecursionError):
@@ -67,7 +70,7 @@ def parsed(data: bytes) -> dict[str, Any]:
 
 
 def check(options: Mapping[str, Any], metrics: Mapping[str, Any]) -> None:
-    """Raises FormatError for what a file cannot note."""
+    """Raises FormatError for options or metrics that a file must not hold (docs/format.md)."""
     facts = options.get(FACTS, {})
     if not isinstance(facts, dict):
         raise FormatError(f"{FACTS}: expected a JSON object, found another")
@@ -83,13 +86,14 @@ def check(options: Mapping[str, Any], metrics: Mapping[str, Any]) -> None:
 
 
 def _finite(text: str) -> int | float:
+    """A number in JSON. Raises ValueError for one that is not finite in double precision."""
     if not isfinite(float(text)):
         raise ValueError(text)
     return int(text) if text.lstrip("-").isdigit() else float(text)
 
 
 def _shallow(value: Any, deepest: int) -> bool:
-    """Whether no more objects and lists than that lie within each other."""
+    """Whether objects and lists are nested at most `deepest` levels deep."""
     if not isinstance(value, dict | list):
         return True
     inner = cast("Iterable[Any]", value.values() if isinstance(value, dict) else value)
@@ -101,17 +105,17 @@ def _is_name(name: str) -> bool:
 
 
 def _is(value: Any, wanted: str) -> bool:
-    """Whether a value is of a kind."""
+    """Whether a value is of one of the kinds above: PLAIN, NUMBER, WHOLE, FLAG or TEXT."""
     if value is None:
         return wanted == PLAIN
     if isinstance(value, bool):
         return wanted in (PLAIN, FLAG)
     if isinstance(value, int | float):
         kinds = (PLAIN, NUMBER, WHOLE) if isinstance(value, int) else (PLAIN, NUMBER)
-        return wanted in kinds and abs(value) <= LARGEST  # nor is NaN
+        return wanted in kinds and abs(value) <= LARGEST  # False for NaN
     return isinstance(value, str) and wanted in (PLAIN, TEXT) and len(value) <= LONGEST_TEXT and _is_text(value)
 
 
 def _is_text(value: str) -> bool:
-    """Whether it can be written: UTF-8 has no halves of pairs of code units."""
+    """Whether UTF-8 can encode it: a single half of a surrogate pair cannot be encoded."""
     return not any("\ud800" <= c <= "\udfff" for c in value)

@@ -1,4 +1,7 @@
-"""Reads the stream of a compact material's nodes in plain Python: docs/format.md, *Kind 1*. The core is faster."""
+"""Decodes the stream of a compact material in plain Python, as docs/format.md, *Kind 1*, specifies it.
+
+This is for reading, and for comparison with the fast decoder in the core, which tests hold to the same results.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +11,11 @@ from itertools import accumulate
 from ...system.errors import FormatError
 from .reference_model import Model
 
-BOTTOM = 2**24
-EVEN, FULL = 2**11, 2**12  # chances of a bit to be 1: as likely as not, and certain
-RATE = 4
-LONGEST, CONTEXT = 20, 24
-FINE = 180
+BOTTOM = 2**24  # the decoder reads more bytes while `range` is below this
+EVEN, FULL = 2**11, 2**12  # probabilities that a bit is 1, as whole numbers: one half, and 1
+RATE = 4  # a probability moves by 2^-RATE of the way towards the bit that came
+LONGEST, CONTEXT = 20, 24  # bits of a number after its first one; probabilities in a context
+FINE = 180  # steps of the fine grid on each axis
 MOST_BANDS, MOST_NODES, MOST_ENTRIES = 16, 2**17, 2**10
 HIGHEST_GAIN, WIDEST_SHAPE = 2**12, 2**10
 MOST_REACHED, REACHED_BY_ANY, REACHED_A_BYTE = 2**26, 2**22, 2**11
@@ -26,7 +29,10 @@ Lattice = tuple[Axis, list[int], list[Axis], list[Axis]]
 def decode(
     data: bytes,
 ) -> tuple[Axis, list[int], list[Axis], list[Axis], list[int], list[Shape], list[int], list[int]]:
-    """theta_h, band, theta_d, phi_d, gain_codes, shape_codes, gain_index, shape_index. Raises FormatError."""
+    """Decodes a whole stream: theta_h, band, theta_d, phi_d, gain_codes, shape_codes, gain_index, shape_index.
+
+    The first four are as in `NodeLattice`, the indices are by node. Raises FormatError for a stream that is not valid.
+    """
     coder = Decoder(data)
     theta_h, band, theta_d, phi_d = lattice = _lattice(coder)
     gains, shapes = _palette(coder)
@@ -51,14 +57,14 @@ def decode(
 
 
 class Decoder:
-    """The range decoder, and whole numbers with adaptive bits."""
+    """The range decoder, and the numbers that are coded with it: docs/format.md, *The range decoder* and *Bits*."""
 
     def __init__(self, data: bytes) -> None:
         self._data, self._read = data, 4
         self._range, self._code = 2**32 - 1, int.from_bytes(data[:4].ljust(4, b"\0"), "big")
 
     def pick(self, weights: Sequence[int]) -> int:
-        """One of several symbols, by whole weights of at least 1."""
+        """Decodes the number of a symbol. weights: of all symbols, whole numbers of at least 1."""
         upto = list(accumulate(weights))
         share = self._range // upto[-1]
         at = self._code // share
@@ -74,14 +80,14 @@ class Decoder:
         return symbol
 
     def bit(self, context: Context, i: int) -> int:
-        """A bit whose chance to be 1, that of a context, learns from it."""
+        """Decodes a bit by probability number i of a context, which adapts to the bit."""
         one = context[i]
         bit = self.pick((FULL - one, one))
         context[i] = one + (FULL - one >> RATE) if bit else one - (one >> RATE)
         return bit
 
     def number(self, context: Context) -> int:
-        """A whole number: with 1 added, how many bits it has after the first, one by one; then these."""
+        """Decodes a whole number x: the number of bits of x + 1 after its leading 1, in unary, and then these bits."""
         n = 0
         while n < LONGEST and self.bit(context, n):
             n += 1
@@ -91,12 +97,12 @@ class Decoder:
         return x - 1
 
     def signed(self, context: Context) -> int:
-        """0, −1, 1, −2, … as 0, 1, 2, 3, …"""
+        """Decodes a whole number with a sign: 0, −1, 1, −2, … are coded as 0, 1, 2, 3, …"""
         x = self.number(context)
         return -(x + 1) // 2 if x % 2 else x // 2
 
     def check_end(self) -> None:
-        """Whether this is the one stream that holds what was found."""
+        """Raises FormatError unless this is the only stream that a writer gives for the decoded symbols."""
         window = int.from_bytes(self._data.ljust(self._read, b"\0")[self._read - 4 : self._read], "big")
         low = (window - self._code) % 2**32
         last = low + self._range - 1
@@ -106,6 +112,7 @@ class Decoder:
 
 
 def _bounded(what: str, value: int, least: int, most: int) -> int:
+    """The value. Raises FormatError if it is not from `least` to `most`."""
     if not least <= value <= most:
         raise FormatError(f"{what}: expected {least} to {most}, found {value}")
     return value

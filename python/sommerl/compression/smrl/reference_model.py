@@ -1,6 +1,7 @@
-"""How likely each entry of a palette is for the next node, in plain Python: docs/format.md, *The entries*.
+"""The model that gives each entry of a palette its weight, or probability, for the next node.
 
-Nothing but +, −, ×, ÷, √ and ⌊⌋ of IEEE 754 doubles, in the order written there, whose letters these are.
+This is docs/format.md, *The entries*, in plain Python, with the same names. It uses only +, −, ×, ÷, √ and ⌊⌋ of IEEE
+754 doubles, in the order given there, so that every decoder gets the same bits.
 """
 
 from __future__ import annotations
@@ -9,20 +10,20 @@ import math
 from bisect import bisect_left, bisect_right
 
 FINE = 180
-OCTAVE, UNIT = 128, 64  # codes to 1 in the coordinates of gains and shapes
+OCTAVE, UNIT = 128, 64  # codes for a step of 1 in the coordinates of gains and of shapes
 NEIGHBOURS = range(10)
-FORGET = 1.0005
-WHOLE = 65536.0
-REACH = 16.0
+FORGET = 1.0005  # how fast the least squares forget: by this factor of P at each node
+WHOLE = 65536.0  # the sum of weights, nearly
+REACH = 16.0  # expected errors from the prediction, beyond which an entry has the weight 1
 
 Floats = list[float]
-Grid = list[Floats]  # [c][node of a row]
-Plane = tuple[Grid, Grid]  # values and errors
-Way = tuple[int, int, float]
+Grid = list[Floats]  # [coordinate][node of a row]
+Plane = tuple[Grid, Grid]  # values, and errors of their predictions
+Way = tuple[int, int, float]  # two neighbouring nodes on an axis, and the share of the second one
 
 
 class Model:
-    """Expects nodes one after the other, in the order of the stream."""
+    """Predicts one node after the other, in the order of the stream. lattice: theta_h, band, theta_d, phi_d."""
 
     def __init__(
         self,
@@ -38,7 +39,7 @@ class Model:
         self._present = self._above = self._higher = _plane(0)
 
     def begin(self, row: int) -> None:
-        """Before the first node of a row."""
+        """To be called before the first node of a row."""
         self._row, band = row, self._band[row]
         if row > 0:
             self._higher, self._above = self._above, self._present
@@ -50,6 +51,7 @@ class Model:
         self._present = _plane(self._width * self._height)
 
     def _moved(self, plane: Plane, old: int, new: int) -> Plane:
+        """A row of one band, interpolated to the nodes of another band."""
         width, moved = len(self._phi_d[old]), _plane(0)
         for y in self._theta_d[new]:
             d0, d1, v = _between(self._theta_d[old], y)
@@ -63,7 +65,7 @@ class Model:
         return moved
 
     def expect(self, d: int, p: int) -> None:
-        """Before a node: what its coordinates are likely to be."""
+        """Predicts the coordinates of node [d, p] of the row. To be called before its weights are asked for."""
         phi_d, at, under = self._phi_d[self._band[self._row]], d * self._width + p, self._row > 0
         mirror = _between(phi_d[:p], FINE - phi_d[p]) if p and FINE - phi_d[p] <= phi_d[p - 1] else None
         for c, predictor in enumerate(self._predictors):
@@ -77,7 +79,7 @@ class Model:
             predictor.predict(up, values, errors)
 
     def _neighbours(self, c: int, d: int, p: int, mirror: Way | None) -> tuple[float, Floats]:
-        """The value that all others are compared with, and these."""
+        """Coordinate c of the neighbours of node [d, p]: `up`, and values 0 to 9."""
         width, under = self._width, self._row > 0
         now, above, higher = (plane[0][c] for plane in (self._present, self._above, self._higher))
         line, at = d * width, d * width + p
@@ -107,20 +109,20 @@ class Model:
         ]
 
     def gain_weights(self) -> list[int]:
-        """The weights of all gains for the node that is expected."""
+        """The weights of all gains for the present node."""
         return self._gains.weigh(*self._predictors[0].expected(), 0.0, 0.0)
 
     def shape_weights(self) -> list[int]:
-        """The weights of all shapes."""
+        """The weights of all shapes for the present node."""
         return self._shapes.weigh(*self._predictors[1].expected(), *self._predictors[2].expected())
 
     @property
     def reached(self) -> int:
-        """Entries of both palettes within reach, added up over all nodes so far."""
+        """The number of entries within reach in both palettes, added up over all nodes so far."""
         return self._gains.reached + self._shapes.reached
 
     def learn(self, d: int, p: int, gain: int, shape: int) -> None:
-        """What follows for the nodes to come."""
+        """Adapts to the entries of node [d, p]."""
         self._gains.learn(gain)
         self._shapes.learn(shape)
         at, (values, errors) = d * self._width + p, self._present
@@ -130,7 +132,7 @@ class Model:
 
 
 class Predictor:
-    """Of one coordinate, from its neighbours: recursive least squares."""
+    """Predicts one coordinate from its neighbours by recursive least squares. values: those in the palette."""
 
     def __init__(self, values: Floats) -> None:
         mean = _sum(values) / len(values)
@@ -140,7 +142,7 @@ class Predictor:
         self._level = 0.15 * math.sqrt(variance)
 
     def predict(self, up: float, values: Floats, errors: Floats) -> None:
-        """errors: of the nodes next to it, as far as there are any."""
+        """Makes a prediction. up, values: of the neighbours. errors: of earlier predictions at neighbouring nodes."""
         self._x = [value - up for value in values]
         self._predicted = up
         for w, x in zip(self._w, self._x, strict=True):
@@ -151,11 +153,11 @@ class Predictor:
         self._scale = total / count + 0.02 * self._level + 1e-4
 
     def expected(self) -> tuple[float, float]:
-        """What is predicted, and 1 / the error that is expected."""
+        """The prediction, and 1 / (its expected error)."""
         return self._predicted, 1.0 / self._scale
 
     def learn(self, value: float) -> float:
-        """Returns how far the prediction was off."""
+        """Adapts to the true value; returns the absolute error of the prediction."""
         error, matrix, x = value - self._predicted, self._matrix, self._x
         g = [_sum([matrix[i][j] * x[i] for i in NEIGHBOURS]) for j in NEIGHBOURS]
         power = 1.0
@@ -170,7 +172,7 @@ class Predictor:
 
 
 class Entries:
-    """Entries to choose from: two coordinates each, and what is known of how often they come."""
+    """The entries of a palette by their two coordinates, sorted by the first, and how often each has been picked."""
 
     def __init__(self, first: Floats, second: Floats) -> None:
         self._places = list(zip(first, second, strict=True))
@@ -180,7 +182,7 @@ class Entries:
         self.reached = 0
 
     def weigh(self, p0: float, s0: float, p1: float, s1: float) -> list[int]:
-        """The weights of all entries around an expected place."""
+        """The weights of all entries. p0, p1: predicted coordinates. s0, s1: 1 / (their expected errors)."""
         self._expected = p0, s0, p1, s1
         reach = _ratio(REACH, s0)
         first, end = bisect_left(self._steps, _step(p0 - reach)), bisect_right(self._steps, _step(p0 + reach))
@@ -194,6 +196,7 @@ class Entries:
         return weights
 
     def _kernels(self, entry: int) -> tuple[float, float]:
+        """The narrow and the wide kernel at an entry."""
         p0, s0, p1, s1 = self._expected
         x, y = (self._places[entry][0] - p0) * s0, (self._places[entry][1] - p1) * s1
         x, y = x * x, y * y
@@ -204,7 +207,7 @@ class Entries:
         return c * b, c * a
 
     def learn(self, entry: int) -> None:
-        """That this entry was picked."""
+        """Adapts to the entry that was picked."""
         near, far = self._kernels(entry)
         near, far = near * self._f, far * self._g
         self._narrow = 0.96 * _ratio(near, near + far) + 0.02
@@ -217,7 +220,7 @@ def _plane(nodes: int) -> Plane:
 
 
 def _between(axis: list[int], place: int) -> Way:
-    """The nodes on either side of a place within the axis, and the way to the second."""
+    """The two nodes around a place on an axis, and the share of the second one."""
     upper = bisect_right(axis, place)
     if upper == len(axis):
         return upper - 1, upper - 1, 0.0
@@ -226,7 +229,7 @@ def _between(axis: list[int], place: int) -> Way:
 
 
 def _around(axis: list[int], place: int) -> Way:
-    """The same on an axis that starts at 0 and returns there at FINE."""
+    """The same on the periodic axis of φ_d, which begins again at FINE."""
     if place < axis[-1]:
         return _between(axis, place)
     return len(axis) - 1, 0, (place - axis[-1]) / (FINE - axis[-1])
@@ -241,12 +244,12 @@ def _whole(x: float) -> int:
 
 
 def _ratio(a: float, b: float) -> float:
-    """a / b as IEEE 754 has it, where Python refuses to divide by 0."""
+    """a / b as IEEE 754 defines it, also for b = 0, where Python raises an error."""
     return a / b if b else math.copysign(math.inf, b) * a if a else math.nan
 
 
 def _sum(values: Floats) -> float:
-    """One after the other; `sum` would compensate for rounding."""
+    """The sum, one value after the other. Python's own `sum` corrects rounding errors (since 3.12)."""
     total = 0.0
     for value in values:
         total += value
