@@ -67,6 +67,9 @@ def test_every_training_option_arrives(capsys, folder, tmp_path):
     flags = [text for key, value in given.items() for text in (f"--{key}", str(value))]
     result = run_json(capsys, "compress", folder / "pearl.binary", "-o", tmp_path / "x.smrl", *flags)
     assert result["options"] == given
+    result = run_json(capsys, "compress", folder / "pearl.binary", "-o", tmp_path / "y.smrl", *flags, "--distinct")
+    assert result["options"] == given | {"distinct": True}
+    assert run_json(capsys, "info", tmp_path / "y.smrl")["options"] == result["options"]
 
 
 def test_several_inputs_go_to_a_folder(capsys, folder, tmp_path):

@@ -28,7 +28,7 @@ SWEEP = [
     *(np.ones(NODES), np.ones((NODES, 3)), 0.1),
 ]
 
-LEARNER = [F32, np.arange(40, dtype=np.uint32), F32[:20].copy(), "kohonen", 5, "boxes", "portable"]
+LEARNER = [F32, np.arange(40, dtype=np.uint32), F32[:20].copy(), "kohonen", 5, "boxes", "portable", False]
 PRESENT = [0, 40, 0.5, np.array([1, 0.5], np.float32)]
 
 

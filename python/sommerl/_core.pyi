@@ -30,10 +30,11 @@ class Learner:
         columns: int,
         search: Literal["boxes", "all", "scalar"] = "boxes",
         simd: str | None = None,
+        distinct: bool = False,
     ) -> None:
         """triples (n, 3): what the cells hold, in [0, 1], in the order of presentation; cells (n,): their numbers;
         weights (M, 3): the units' first weights, in [0, 1]; columns: units in a row of the sheet. search and simd
-        change nothing but the time.
+        change nothing but the time. distinct: a cell that a unit has stored keeps its one place when it comes back.
         """
 
     def present(self, start: int, stop: int, alpha: float, falloff: NDArray[np.float32]) -> float:

@@ -66,7 +66,8 @@ struct Learner(train::Learner);
 #[pymethods]
 impl Learner {
     #[new]
-    #[pyo3(signature = (triples, cells, weights, rule, columns, search = "boxes", simd = None))]
+    #[pyo3(signature = (triples, cells, weights, rule, columns, search = "boxes", simd = None, distinct = false))]
+    #[allow(clippy::too_many_arguments)]
     fn new(
         triples: Triples,
         cells: PyReadonlyArray1<u32>,
@@ -75,6 +76,7 @@ impl Learner {
         columns: usize,
         search: &str,
         simd: Option<&str>,
+        distinct: bool,
     ) -> PyResult<Self> {
         guarded(|| {
             let (triples, weights) = (rows(&triples, "triples")?, rows(&weights, "weights")?);
@@ -87,6 +89,7 @@ impl Learner {
             shares(weights.as_flattened(), "weights")?;
             let mut learner = train::Learner::new(triples.to_vec(), cells.to_vec(), weights);
             learner.columns = columns;
+            learner.distinct = distinct;
             learner.path = path_named(simd)?;
             learner.rule = match rule {
                 "paper" => train::Rule::Paper,

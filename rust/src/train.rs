@@ -19,6 +19,13 @@ struct Originals {
     cell: [u32; 4],
 }
 
+impl Originals {
+    /// The slot that holds a cell, if one does.
+    fn slot_of(&self, cell: u32) -> Option<usize> {
+        self.cell[..STORED].iter().position(|&stored| stored == cell)
+    }
+}
+
 /// Learning rule for the weights: Eq. 2 with its factor x (`paper`) or without it (`kohonen`).
 #[derive(Clone, Copy, PartialEq)]
 pub enum Rule {
@@ -58,6 +65,8 @@ pub struct Learner {
     moved: bool,
     before: Vec<Originals>,
     pub rule: Rule,
+    /// Whether a cell that a unit has stored takes its own place when it comes back, instead of another slot.
+    pub distinct: bool,
     /// Units in a row of the sheet; a chain is a sheet of one row.
     pub columns: usize,
     pub path: Path,
@@ -78,6 +87,7 @@ impl Learner {
             stored,
             moved: false,
             rule: Rule::Kohonen,
+            distinct: false,
             columns: weights.len(),
             path: Path::available().last().map_or(Path::Portable, |&(_, path)| path),
             search: Search::Boxes,
@@ -173,7 +183,9 @@ impl Learner {
             if NEIGHBOURS {
                 self.move_neighbours::<PAPER>(winner, x, epoch);
             }
-            let weight = attract::<PAPER>(&mut self.stored[winner], learnt, x, self.cells[k], epoch.alpha);
+            let (stored, cell) = (&mut self.stored[winner], self.cells[k]);
+            let own = if self.distinct { stored.slot_of(cell) } else { None };
+            let weight = attract::<PAPER>(stored, own, learnt, x, cell, epoch.alpha);
             // Two steps that cancel are no rest: smaller ones need not cancel.
             self.moved |= (learnt != old) | (weight != learnt);
             self.weights.set(winner, weight);
@@ -264,10 +276,12 @@ impl Watch {
     }
 }
 
-/// Phase 2: Eq. 3 to 6. A slot that holds nothing is infinitely far away. Returns the winner's new weight.
+/// Phase 2: Eq. 3 to 6. A slot that holds nothing is infinitely far away. `own` is the slot to use instead of the farthest.
+/// Returns the winner's new weight.
 #[inline(always)]
 fn attract<const PAPER: bool>(
     stored: &mut Originals,
+    own: Option<usize>,
     weight: [f32; 3],
     x: [f32; 3],
     cell: u32,
@@ -282,6 +296,7 @@ fn attract<const PAPER: bool>(
     });
     let mut farthest = usize::from(distance[1] > distance[0]);
     farthest = if distance[2] > distance[farthest] { 2 } else { farthest };
+    farthest = own.unwrap_or(farthest);
     let replaces = distance[3] <= distance[farthest];
     let attractor: [f32; 3] = std::array::from_fn(|j| if replaces { x[j] } else { stored.x[j][farthest] });
     if replaces {

@@ -90,6 +90,91 @@ def test_least_squares_are_better_than_samples(paint, monkeypatch):
     assert error_of(fitted) < 0.8 * error_of(sampled)
 
 
+def check_measure(measure):
+    """Ratios of sin θ_h √θ_h · sin θ_d cos θ_d · cos θ_i cos θ_o · (the width of a step), by hand."""
+
+    def at(theta_h, theta_d, cos_i, cos_o):
+        a = np.sqrt(theta_h / 90)
+        x = 360 * a if a < 0.25 else 90 + 120 * (a - 0.25)
+        wi, wo = ((0.0, 0.0, np.array(cosine)) for cosine in (cos_i, cos_o))
+        return float(measure(np.array(x), np.array(2.0 * theta_d), np.array(0.0), wi, wo))
+
+    here = at(30, 30, 0.75, 0.75)
+    # In the plane of incidence, light at 60° and viewer at 0°; and the other way round: 0.5 · 1 for 0.75².
+    assert at(30, 30, 0.5, 1.0) / here == pytest.approx(0.888889, rel=1e-5)
+    assert at(30, 30, 1.0, 0.5) / here == pytest.approx(0.888889, rel=1e-5)
+    # sin 15° cos 15° = 0.25 for sin 30° cos 30° = 0.433013.
+    assert at(30, 15, 0.75, 0.75) / here == pytest.approx(0.57735, rel=1e-5)
+    # θ_h = 1.40625°, where √(θ_h / 90°) = 1/8, below the knee: 0.0245412 · 1.185854 / 360 for 0.5 · 5.477226 / 120.
+    assert at(1.40625, 30, 0.75, 0.75) / here == pytest.approx(0.00354222, rel=1e-5)
+    assert at(30, 30, -0.1, 1.0) == at(30, 30, 1.0, -0.1) == 0
+
+
+def test_the_measure_of_the_fit():
+    check_measure(fit._measure)
+    for k in (0, 1):  # without a cosine
+        must_fail(check_measure, lambda x, y, z, *w, k=k: fit._measure(x, y, z, w[k], w[k]))
+    must_fail(check_measure, lambda *place: 4 * fit._measure(*place) ** 0.5)
+
+
+def grid_by_hand(brdf, scale, rows, y_step, z_step):
+    """∛(f_r cos θ_i cos θ_o / scale) of lines through the fine grid, and the root of the measure; see `Fitter`."""
+    x, y, z = np.meshgrid(rows, np.arange(0, 181, y_step), np.arange(0, 180, z_step), indexing="ij")
+    theta_h = np.where(x < 90, x / 360, 0.25 + (x - 90) / 120) ** 2 * np.pi / 2
+    theta_d, phi_d = y * np.pi / 360, z * np.pi / 180
+    up, tilt = np.cos(theta_h) * np.cos(theta_d), np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d)
+    cos_i, cos_o = up - tilt, up + tilt
+    seen = np.minimum(cos_i, cos_o) > 0.01
+    along, across = np.sin(theta_d) * np.cos(phi_d), np.sin(theta_d) * np.sin(phi_d)
+    wi, wo = (
+        np.stack(
+            [
+                np.cos(theta_d) * np.sin(theta_h) + s * along * np.cos(theta_h),
+                s * across,
+                np.cos(theta_d) * np.cos(theta_h) - s * along * np.sin(theta_h),
+            ],
+            -1,
+        )
+        for s in (1, -1)
+    )
+    values = np.zeros((*x.shape, 3))
+    values[seen] = np.cbrt(brdf.eval(wi[seen], wo[seen]) * (cos_i * cos_o)[seen][:, None] / scale)
+    for j in range(1, values.shape[1]):  # below the horizon, as above it
+        values[:, j] = np.where(seen[:, j, :, None], values[:, j], values[:, j - 1])
+    solid = np.sin(theta_h) * np.sqrt(theta_h) * np.sin(theta_d) * np.cos(theta_d) / np.where(x < 90, 360, 120)
+    return values, np.sqrt(np.where(seen, solid * cos_i * cos_o, 0.0))
+
+
+def of_straight_lines(values, weight, axis):
+    """The weighted squared error, over all lines along an axis, of a straight line between their ends."""
+    values, weight = np.moveaxis(values, axis, 0), np.moveaxis(weight, axis, 0)
+    t = np.linspace(0, 1, len(values))[:, None, None, None]
+    return float((weight[..., None] * ((1 - t) * values[0] + t * values[-1] - values) ** 2).sum())
+
+
+def check_shares(errors, by_hand):
+    """A few hundred lines of ten rows stand for all of them, hence the tolerance."""
+    assert np.allclose(errors, by_hand, rtol=0.3)
+
+
+def test_errors_of_bands_and_of_rows_are_of_one_scale(paint):
+    """With two nodes to an axis (one, in φ_d), over the whole fine grid: shares of the error of two rows."""
+    brdf, edges = builtin("purple-paint"), paint._edges
+    rows = of_straight_lines(*grid_by_hand(brdf, paint.scale, np.arange(181), 3, 4), 0)
+    found, by_hand = [], []
+    for band in (3, 5):
+        inside = np.arange(edges[band], min(edges[band + 1], 180) + 1)
+        values, weight = grid_by_hand(brdf, paint.scale, inside, 1, 9)
+        found.append(paint._theta_d[band][2][1] / paint._rows[2][1])
+        by_hand.append(of_straight_lines(values, weight, 1) * 9 / 12 / rows)
+        grid = grid_by_hand(brdf, paint.scale, inside, 6, 1)
+        values, weight = (np.concatenate([part, part[:, :, :1]], axis=2) for part in grid)  # once around
+        found.append(paint._phi_d[band][1][1] / paint._rows[2][1])
+        by_hand.append(of_straight_lines(values, weight, 2) * 6 / 12 / rows)
+    check_shares(found, by_hand)
+    must_fail(check_shares, np.array(found) * 4, by_hand)
+
+
 def check_lambertian(brdf, albedo):
     inner = np.minimum(A[:, 2], B[:, 2]) > 0.3
     assert np.allclose(brdf.eval(A, B)[inner], albedo / np.pi, rtol=0.03)

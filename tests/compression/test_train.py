@@ -24,8 +24,8 @@ def trace(kernels, table, options):
         Palette = kernels.Palette
 
         class Learner:
-            def __new__(cls, *arguments):
-                kept.append(kernels.Learner(*arguments))
+            def __new__(cls, *arguments, **options):
+                kept.append(kernels.Learner(*arguments, **options))
                 return kept[0]
 
     material, report = train(table, options, kernels=Recorded)
@@ -47,6 +47,11 @@ def test_the_core_equals_the_reference_bit_for_bit(small_table, rule, order, clu
 
 def test_the_core_equals_the_reference_at_the_default_rate(small_table):
     check_same_bits(_core, small_table, TrainOptions(clusters=32, epochs=8))
+
+
+@pytest.mark.parametrize(("rule", "clusters"), list(itertools.product(("paper", "kohonen"), (3, 16, 40))))
+def test_the_core_equals_the_reference_with_distinct_cells(small_table, rule, clusters):
+    check_same_bits(_core, small_table, TrainOptions(clusters=clusters, epochs=8, rule=rule, alpha=0.3, distinct=True))
 
 
 @pytest.mark.parametrize("fault", ["distance", "tie", "replace", "rate"])
@@ -214,7 +219,7 @@ def test_report_and_progress(small_table):
         ("clusters", 0), ("clusters", 65537), ("epochs", 0), ("seed", -1), ("alpha", 0.0), ("alpha", 1.5),
         ("alpha", float("nan")), ("clusters", 4.5), ("seed", "one"), ("alpha", None),
         ("radius", -1.0), ("radius", float("inf")), ("rule", "hebb"), ("order", "up"),
-        ("topology", "torus"),
+        ("topology", "torus"), ("distinct", "yes"), ("distinct", 2),
     ],
 )  # fmt: skip
 def test_senseless_options_are_refused(option, value):
@@ -223,10 +228,16 @@ def test_senseless_options_are_refused(option, value):
 
 
 def test_options_may_be_numpys_numbers():
-    options = TrainOptions(clusters=np.int64(4), seed=np.uint8(1), alpha=np.float32(0.5), radius=2)
-    assert [type(value) for value in (options.clusters, options.seed, options.alpha, options.radius)] == [
-        int, int, float, float,
-    ]  # fmt: skip
+    options = TrainOptions(
+        clusters=np.int64(4), seed=np.uint8(1), alpha=np.float32(0.5), radius=2, distinct=np.bool(True)
+    )
+    found = options.clusters, options.seed, options.alpha, options.radius, options.distinct
+    assert [type(value) for value in found] == [int, int, float, float, bool]
+
+
+def test_distinct_is_noted_only_where_it_is_set():
+    assert "distinct" not in TrainOptions().noted()
+    assert TrainOptions(distinct=True).noted() == TrainOptions().noted() | {"distinct": True}
 
 
 def test_the_core_refuses_what_would_read_outside():

@@ -69,10 +69,14 @@ def arguments(add: Any) -> None:
         "order": "paper: of presentation",
         "radius": "paper: of the neighbourhood in the first epoch, in units; 0: the winner learns alone",
         "topology": "paper: how the units are arranged for that",
+        "distinct": "paper: a unit stores a cell once at most, and not again in a later epoch",
     }
     allowed = {"rule": get_args(Rule), "order": get_args(Order), "topology": get_args(Topology)}
     for field in fields(TrainOptions):
         default = getattr(DEFAULTS, field.name)
+        if isinstance(default, bool):
+            parser.add_argument(f"--{field.name}", action="store_true", help=helps[field.name])
+            continue
         parser.add_argument(
             f"--{field.name}",
             type=type(default),

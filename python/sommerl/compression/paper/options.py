@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import isfinite
 from operator import index
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from ...system.errors import OptionError
 
@@ -27,6 +27,8 @@ class TrainOptions:
     radius: standard deviation, in units, of the neighbourhood in the first epoch; it shrinks as alpha does. 0: the
         winner learns alone.
     topology: how the units are arranged for that: in a "chain", or in a "sheet" of ⌈√M⌉ columns.
+    distinct: whether a unit stores a cell once at most. Eq. 3-5 let a cell that comes back in a later epoch take a
+        second place, and a third; with `distinct` it takes the place that it has.
 
     Raises OptionError for values outside these.
     """
@@ -39,6 +41,7 @@ class TrainOptions:
     order: Order = "seeded"
     radius: float = 0.0
     topology: Topology = "chain"
+    distinct: bool = False
 
     def __post_init__(self) -> None:
         for field, allowed in (("rule", Rule), ("order", Order), ("topology", Topology)):
@@ -56,6 +59,9 @@ class TrainOptions:
                 object.__setattr__(self, field, kind(getattr(self, field)))  # NumPy's numbers become Python's
             except (TypeError, ValueError) as error:
                 raise OptionError(f"{field}: expected a number, found {getattr(self, field)!r}") from error
+        if self.distinct not in (False, True):
+            raise OptionError(f"distinct: expected true or false, found {self.distinct!r}")
+        object.__setattr__(self, "distinct", bool(self.distinct))
         for field, low, high in (("clusters", 1, 2**16), ("epochs", 1, 10_000), ("seed", 0, 2**64 - 1)):
             if not low <= getattr(self, field) <= high:
                 raise OptionError(f"{field}: expected {low} to {high}, found {getattr(self, field)}")
@@ -63,3 +69,8 @@ class TrainOptions:
             raise OptionError(f"alpha: expected a number above 0, at most 1, found {self.alpha}")
         if not (isfinite(self.radius) and 0 <= self.radius <= 1000):
             raise OptionError(f"radius: expected 0 to 1000, found {self.radius}")
+
+    def noted(self) -> dict[str, Any]:
+        """The options as a material's file notes them. `distinct`, which came later, is noted if it is set: files made
+        without it keep their bytes."""
+        return {name: value for name, value in asdict(self).items() if name != "distinct" or value}

@@ -28,7 +28,14 @@ class Learner:
     """Units of the SOM and their MANs, in training (phases 1 and 2)."""
 
     def __init__(
-        self, triples: F32, cells: NDArray[np.uint32], weights: F32, rule: Literal["paper", "kohonen"], columns: int
+        self,
+        triples: F32,
+        cells: NDArray[np.uint32],
+        weights: F32,
+        rule: Literal["paper", "kohonen"],
+        columns: int,
+        *,
+        distinct: bool = False,
     ) -> None:
         self._x = triples
         self._cells = cells
@@ -38,6 +45,7 @@ class Learner:
         self._moved, self._before = False, self._stored.copy()
         self._rule = rule
         self._columns = columns
+        self._distinct = distinct
 
     def present(self, start: int, stop: int, alpha: float, falloff: F32) -> float:
         total = 0.0
@@ -61,6 +69,8 @@ class Learner:
         c, originals = self._c[winner], self._originals[winner]
         distances = squared_distance(originals, c)  # infinite where nothing is stored yet
         farthest = int(distances.argmax())  # Eq. 3
+        if self._distinct and cell in self._stored[winner]:  # it takes its own place, which changes nothing
+            farthest = self._stored[winner].tolist().index(cell)
         if squared_distance(x, c) <= distances[farthest]:  # Eq. 5
             originals[farthest], self._stored[winner, farthest] = x, cell  # Eq. 4
         self._move(winner, originals[farthest], alpha)  # Eq. 6

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -60,7 +60,7 @@ def train(
     rgb = table.values[above]
     x = (rgb / rgb.max()).astype(np.float32)
     order, weights = _start(x, options, table.name)
-    learner = kernels.Learner(x[order], order, weights, options.rule, _columns(options))
+    learner = kernels.Learner(x[order], order, weights, options.rule, _columns(options), distinct=options.distinct)
     errors = _learn(learner, len(x), options, progress)
 
     cells = _lut_cells(learner.weights(), learner.stored_cells(), x)
@@ -74,7 +74,7 @@ def train(
         index,
         table.lattice,
         name=table.name,
-        options=asdict(options),
+        options=options.noted(),
         source_sha256=table.source.sha256,
         made_from=table.source.made_from,
     )

@@ -27,6 +27,7 @@ KNOWN: dict[str, dict[str, str]] = {
         **dict.fromkeys(("clusters", "epochs", "seed"), WHOLE),
         **dict.fromkeys(("alpha", "radius"), NUMBER),
         **dict.fromkeys(("rule", "order", "topology"), TEXT),
+        "distinct": FLAG,
     },
     "metrics": dict.fromkeys(("rmse", "log_error_cosine", "relative_error", "quantisation_error"), NUMBER),
     FACTS: {
