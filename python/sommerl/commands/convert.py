@@ -14,6 +14,7 @@ from ..formats import merl, rgl_export, scene
 from ..formats.load import load
 from ..formats.scattered import ScatteredTable
 from ..formats.shader import source as shader
+from ..formats.shader.language import LANGUAGES
 from ..models.builtin import NAMES, builtin_table
 from ..plots import coverage
 from ..reflectance.brdf import Brdf
@@ -29,7 +30,7 @@ EXTENSIONS = {
     ".smrl": "Sommerl, compressed with the defaults of compress if need be",
     ".binary": "MERL",
     ".bsdf": "RGL, for the `measured` materials of Mitsuba and pbrt-v4",
-    **dict.fromkeys(shader.LANGUAGES, "source code with an eval, compressed first if need be"),
+    **dict.fromkeys(LANGUAGES, "source code with an eval, compressed first if need be"),
     ".xml": "Mitsuba scene snippet that loads IN",
     ".json": "the same for load_dict",
 }
@@ -87,7 +88,7 @@ def _write(brdf: Brdf, options: Namespace, extension: str) -> Brdf:
     if extension == ".bsdf":
         rgl_export.write(brdf, output, spectral=options.spectral)
         return brdf
-    if extension in shader.LANGUAGES:
+    if extension in LANGUAGES:
         material = brdf if isinstance(brdf, SomManBrdf) else trained(BrdfTable.of(brdf), TrainOptions())[0]
         shader.write(material, output)
         return material
