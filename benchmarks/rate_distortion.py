@@ -25,7 +25,7 @@ import curves
 from representations import representations, short_name
 
 from sommerl import Brdf, BrdfTable, SommerlError, load
-from sommerl.formats.load import EXTENSIONS
+from sommerl.formats.registry import by_extension, readable
 from sommerl.reflectance.distance import table_metrics
 from sommerl.render.compare import compare_on_sphere
 from sommerl.render.environment import default_environment, load_environment
@@ -100,7 +100,7 @@ def finite(rows: Sequence[Row]) -> list[Row]:
 
 def chosen(folder: Path, names: Sequence[str] | None) -> list[Path]:
     """The files of materials in a folder: all, or those named, with RGL's _rgb or without."""
-    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in EXTENSIONS)
+    paths = sorted(path for path in folder.iterdir() if by_extension(readable(), path))
     known = {name for path in paths for name in (path.stem, short_name(path.stem))}
     missing = [name for name in names or () if name not in known]
     if missing or not paths:

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..formats.load import EXTENSIONS, interpolated, load
+from ..formats.load import interpolated, load
+from ..formats.registry import by_extension, readable
 from ..models.builtin import NAMES
 from ..plots.contact_sheet import captioned, tiled
 from ..reflectance.brdf import Brdf
@@ -207,7 +208,7 @@ def _files(source: str) -> Iterator[str]:
     if source in NAMES or not folder.is_dir():
         yield source
         return
-    files = sorted(str(path) for path in folder.iterdir() if path.suffix.lower() in EXTENSIONS and path.is_file())
+    files = sorted(str(path) for path in folder.iterdir() if by_extension(readable(), path) and path.is_file())
     if not files:
         raise MaterialError(f"{source}: expected a folder with materials, found none in it")
     yield from files

@@ -17,6 +17,7 @@ from ..reflectance.table import BrdfTable
 from ..system import door
 from ..system.errors import FormatError
 from ..system.visible import visible
+from .format import Format
 from .scattered import to_table
 from .spectra import srgb_weights
 from .text import LARGEST_FILE, rows, text_of, uncommented
@@ -61,3 +62,14 @@ def parse(path: Path, data: bytes) -> BrdfTable:
         )
     except FormatError as error:
         raise FormatError(f"{path}: {error}") from error
+
+
+FORMAT = Format(
+    "Cornell",
+    (".brdf",),
+    "scattered samples of spectra",
+    needs="formats",
+    sniff=looks_like,
+    read=parse,
+    largest=LARGEST_FILE,
+)

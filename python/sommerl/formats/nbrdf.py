@@ -22,6 +22,7 @@ from ..system import door
 from ..system.errors import FormatError, MaterialError
 from ..system.visible import visible
 from . import hdf5
+from .format import Format
 from .numpy_files import MAGIC, read_npy, read_npz
 
 ARRAYS = ("fc1", "b1", "fc2", "b2", "fc3", "b3")
@@ -97,3 +98,20 @@ def _keras(path: Path, data: bytes) -> dict[str, NDArray[Any]]:
         raise FormatError(f"{path}: expected dense layers of shapes {SHAPES} with biases, found {list(found)}")
     ordered = [found[shape][part] for shape in SHAPES for part in ("kernel", "bias")]
     return dict(zip(ARRAYS, ordered, strict=True))
+
+
+def _hdf5(path: Path, data: bytes) -> NeuralBrdf:
+    if not hdf5.looks_like(data):
+        raise FormatError(f"{path}: expected an HDF5 file, found another kind of file")
+    return parse(path, data)
+
+
+FORMAT = Format(
+    "neural BRDF",
+    (".h5", ".hdf5"),
+    "a Keras model of three dense layers",
+    needs="formats",
+    sniff=hdf5.looks_like,
+    read=_hdf5,
+    largest=LARGEST_FILE,
+)

@@ -28,6 +28,7 @@ from ..system import door
 from ..system.errors import FormatError
 from ..system.visible import visible
 from . import tensor
+from .format import Format
 from .spectra import srgb_weights
 
 LARGEST_SIDE = 4096  # of any grid in a file
@@ -319,3 +320,21 @@ def _corners(f: Any, x: Array, y: Array, shape: tuple[int, ...]) -> list[tuple[A
 
 def _blend(f: Any, buffer: Any, offset: Any, corners: list[tuple[Array, Array]]) -> Array:
     return sum(weight * f.gather(buffer, offset + at) for at, weight in corners)
+
+
+def _write(brdf: Brdf, path: Path) -> Brdf:
+    from . import rgl_export  # which needs what is above
+
+    rgl_export.write(brdf, path)
+    return brdf
+
+
+FORMAT = Format(
+    "RGL",
+    (".bsdf",),
+    "an isotropic measurement, RGB or spectral; `measured` in Mitsuba and pbrt-v4",
+    sniff=looks_like,
+    read=parse,
+    largest=tensor.LARGEST_FILE,
+    write=_write,
+)

@@ -10,7 +10,8 @@ from typing import Any
 from ..compression.material import SomManBrdf
 from ..compression.paper.options import TrainOptions
 from ..compression.paper.train import train
-from ..formats.load import EXTENSIONS, load_table
+from ..formats.load import load_table
+from ..formats.registry import extensions, readable
 from ..reflectance.table import BrdfTable
 from ..system.errors import FormatError
 
@@ -32,9 +33,10 @@ def material(data: Path | None, name: str) -> BrdfTable:
     elif data.is_file():
         source = f"{data}:{name}"
     else:
-        found = [path for extension in EXTENSIONS if (path := data / f"{name}{extension}").is_file()]
+        known = extensions(readable())
+        found = [path for extension in known if (path := data / f"{name}{extension}").is_file()]
         if not found:
-            raise FormatError(f"{data}: expected a file {name} with one of {', '.join(EXTENSIONS)}, found none")
+            raise FormatError(f"{data}: expected a file {name} with one of {', '.join(known)}, found none")
         source = str(found[0])
     return load_table(source)
 
