@@ -17,7 +17,6 @@ import json
 import math
 import statistics
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +54,7 @@ def measured(path: Path, options: argparse.Namespace, environment: Any) -> list[
     rows: list[Row] = []
     for representation, comparison in zip(found, comparisons, strict=True):
         row = {"material": short_name(path.stem), "family": representation.family, "label": representation.label}
-        row |= {"bytes": representation.size, **asdict(comparison.metrics)}
+        row |= {"bytes": representation.size, **comparison.metrics}
         row |= {"table_log_error_cosine": log_error(reference, representation.brdf)}
         rows.append(row | {"seconds": representation.seconds, "bytes_memory": representation.bytes_memory})
     return rows
@@ -64,7 +63,7 @@ def measured(path: Path, options: argparse.Namespace, environment: Any) -> list[
 def log_error(reference: BrdfTable, brdf: Brdf) -> float:
     """Of a representation at the reference's cell centres."""
     sampled = BrdfTable.sample(brdf, reference.lattice)
-    return table_metrics(reference.values, sampled.values, reference.lattice).log_error_cosine
+    return table_metrics(reference.values, sampled.values, reference.lattice)["log_error_cosine"]
 
 
 def means(rows: Sequence[Row]) -> list[Row]:

@@ -38,6 +38,7 @@ from sommerl.factored.fit import factor
 from sommerl.fitting.fit import fit
 from sommerl.fitting.options import FitOptions
 from sommerl.reflectance.brdf import Brdf
+from sommerl.reflectance.metric import decibels
 from sommerl.render.frame import Scene
 from sommerl.render.llvm import mitsuba
 from sommerl.render.metrics import image_metrics
@@ -96,7 +97,7 @@ def qualities(found: dict[str, Brdf], name: str, size: int) -> dict[str, float]:
     }
     reference = images["raw table"]
     return {
-        key: image_metrics(reference.pixels, image.pixels, reference.mask).psnr_object_db
+        key: image_metrics(reference.pixels, image.pixels, reference.mask)["psnr_object_db"]
         for key, image in images.items()
     }
 
@@ -160,7 +161,7 @@ def show(source: str, result: dict[str, Any]) -> None:
             text(one["time"]),
             f"{one['noise']:.2f}",
             f"{one['error']:.3f}",
-            "" if one["psnr_object_db"] is None else console.decibels(one["psnr_object_db"]),
+            "" if one["psnr_object_db"] is None else decibels(one["psnr_object_db"]),
         ]
         for name, one in result["representations"].items()
     ]

@@ -17,6 +17,7 @@ from ..compression.smrl import file as smrl
 from ..formats.load import load, load_table
 from ..reflectance.brdf import Brdf
 from ..reflectance.distance import table_metrics
+from ..reflectance.metric import decibels
 from ..reflectance.table import BrdfTable
 from ..render.compare import judge_on_sphere
 from ..render.environment import default_environment
@@ -182,7 +183,7 @@ def trained(table: BrdfTable, options: TrainOptions) -> tuple[SomManBrdf, TrainR
     with console.progress(f"training {table.name}") as advance:
         material, report = train(table, options, progress=advance)
     metrics = table_metrics(table.values, material.values, table.lattice)
-    measured = asdict(metrics) | {"quantisation_error": report.quantisation_error[-1]}
+    measured = metrics | {"quantisation_error": report.quantisation_error[-1]}
     material.metrics = {name: _rounded(value) for name, value in measured.items()}
     facts = table.facts | (clamped(table) if table.cells_clamped else {})
     if facts:
@@ -216,7 +217,7 @@ def compact_rows(
     rows = {
         "nodes": str(material.lattice.size),
         "palette": f"{len(material.gains)} gains, {len(material.lut)} shapes",
-        "PSNR, object, on a sphere": console.decibels(report.psnr_db) if report.psnr_db is not None else "not measured",
+        "PSNR, object, on a sphere": decibels(report.psnr_db) if report.psnr_db is not None else "not measured",
         "size in memory": console.size(material.bytes_memory),
         "size on disk": console.size(bytes_disk),
     }

@@ -7,7 +7,7 @@ import textwrap
 import time
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import compress
 from pathlib import Path
@@ -141,7 +141,7 @@ def _render(options: Namespace) -> dict[str, Any]:
         _write(outputs["reference"], references, scale, caption)
         names = _held_against(pairs, labels)
         _write_against(outputs, comparison, names)
-        result |= asdict(comparison.metrics) | {"reference": names[0], "candidate": names[1]}
+        result |= comparison.metrics | {"reference": names[0], "candidate": names[1]}
         result |= {f"{name}_image": str(path) for name, path in outputs.items()}
         rows = image_rows(comparison.metrics)
         held = [pair for pair in pairs if pair.against is not None]
