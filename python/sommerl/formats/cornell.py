@@ -37,7 +37,7 @@ def read(path: str | Path) -> BrdfTable:
 
 
 def parse(path: Path, data: bytes) -> BrdfTable:
-    """The same of a file's bytes."""
+    """As `read`, from the file's bytes; the path is for names and messages alone."""
     lines = uncommented(text_of(path, data))
     if not lines or not re.fullmatch(r"\d{1,9}", lines[0]) or not 2 <= int(lines[0]) <= MOST_WAVELENGTHS:
         found = repr(lines[0][:20]) if lines else "nothing"

@@ -43,7 +43,7 @@ def read(path: str | Path, member: str = "") -> MultiLobe:
 
 
 def parse(path: Path, data: bytes, member: str = "") -> MultiLobe:
-    """The same of a file's bytes."""
+    """As `read`, from the file's bytes; the path is for names and messages alone."""
     try:
         found = json.loads(data)
     except (ValueError, RecursionError) as error:

@@ -50,7 +50,7 @@ def read(path: str | Path) -> MerlTable:
 
 
 def parse(path: Path, data: bytes) -> MerlTable:
-    """The same of a file's bytes."""
+    """As `read`, from the file's bytes; the path is for names and messages alone."""
     if len(data) < HEADER_BYTES:
         raise FormatError(f"{path}: expected a MERL header of {HEADER_BYTES} bytes, found {len(data)}")
     dimensions = _dimensions(data)

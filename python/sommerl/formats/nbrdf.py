@@ -36,7 +36,8 @@ def read(path: str | Path, member: str = "") -> NeuralBrdf:
 
 
 def parse(path: Path, data: bytes, member: str = "") -> NeuralBrdf:
-    """The same of a file's bytes; of NAME_fc1.npy, the other arrays are read beside it."""
+    """As `read`, from the file's bytes. Of NAME_fc1.npy and the like, the other five arrays are read from files beside
+    it."""
     try:
         if hdf5.looks_like(data):
             return _layers(_keras(path, data), visible(path.stem))

@@ -50,7 +50,7 @@ def read(path: str | Path) -> BrdfTable:
 
 
 def parse(path: Path, data: bytes) -> BrdfTable:
-    """The same of a file's bytes."""
+    """As `read`, from the file's bytes; the path is for names and messages alone."""
     if data.startswith(numpy_files.MAGIC):
         columns = _fields(path, numpy_files.read_npy(path, data))
     elif data.startswith(numpy_files.ZIP_MAGIC):

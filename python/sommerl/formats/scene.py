@@ -73,9 +73,9 @@ def _json(name: str, path: Path) -> str:
 
 
 def read(path: str | Path) -> dict[str, Any]:
-    """The dictionary in a .json snippet, with the file's place from where `path` is.
+    """The dictionary in a .json snippet, with `filename` resolved against the folder of the snippet.
 
-    Raises FormatError if it is none.
+    Raises FormatError if it is not a snippet.
     """
     path = Path(path)
     try:
