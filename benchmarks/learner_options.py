@@ -18,7 +18,6 @@ from sommerl import TrainOptions, load_table, train
 from sommerl.compression.smrl.file import encode
 from sommerl.render.compare import compare_on_sphere
 from sommerl.render.environment import default_environment, load_environment
-from sommerl.render.metrics import ImageMetrics
 
 # material, clusters, epochs, which PSNR
 CASES = (
@@ -34,7 +33,7 @@ MATERIALS = tuple(dict.fromkeys(case[0] for case in CASES))
 GRID = [(rule, alpha) for rule in ("paper", "kohonen") for alpha in (0.5, 0.1, 0.02, 0.004)]
 
 
-def measured(path: Path, environment: Any, spp: int, **options: Any) -> tuple[ImageMetrics, int]:
+def measured(path: Path, environment: Any, spp: int, **options: Any) -> tuple[dict[str, float], int]:
     """How far a material is from its table, and the bytes of its file."""
     table = load_table(path).with_interpolation("nearest")
     material, _ = train(table, TrainOptions(**options))
@@ -59,14 +58,14 @@ def main() -> None:
             for name, clusters, epochs, over in CASES:
                 chosen = {"clusters": clusters, "epochs": epochs, "rule": rule, "alpha": alpha, "seed": seed}
                 metrics, _ = measured(options.folder / f"{name}.binary", environment, options.spp, **chosen)
-                row.append(f"{metrics.psnr_frame_db if over == 'frame' else metrics.psnr_object_db:.1f}")
+                row.append(f"{metrics['psnr_frame_db'] if over == 'frame' else metrics['psnr_object_db']:.1f}")
             print(f"| {rule} | {alpha} | {seed} | " + " | ".join(row) + " |", flush=True)
     print(f"\nThe defaults: M = {default.clusters}, {default.epochs} epochs\n")
     print("| material | PSNR object [dB] | PSNR frame [dB] | file [bytes] |\n|---|---|---|---|")
     sizes: list[int] = []
     for name in MATERIALS:
         metrics, size = measured(options.folder / f"{name}.binary", environment, options.spp)
-        print(f"| {name} | {metrics.psnr_object_db:.1f} | {metrics.psnr_frame_db:.1f} | {size} |", flush=True)
+        print(f"| {name} | {metrics['psnr_object_db']:.1f} | {metrics['psnr_frame_db']:.1f} | {size} |", flush=True)
         sizes.append(size)
     print(f"| median | | | {statistics.median(sizes):.0f} |")
 

@@ -17,7 +17,6 @@ import json
 import math
 import statistics
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ import curves
 from representations import representations, short_name
 
 from sommerl import Brdf, BrdfTable, SommerlError, load
-from sommerl.formats.load import EXTENSIONS
+from sommerl.formats.registry import by_extension, readable
 from sommerl.reflectance.distance import table_metrics
 from sommerl.render.compare import compare_on_sphere
 from sommerl.render.environment import default_environment, load_environment
@@ -55,7 +54,7 @@ def measured(path: Path, options: argparse.Namespace, environment: Any) -> list[
     rows: list[Row] = []
     for representation, comparison in zip(found, comparisons, strict=True):
         row = {"material": short_name(path.stem), "family": representation.family, "label": representation.label}
-        row |= {"bytes": representation.size, **asdict(comparison.metrics)}
+        row |= {"bytes": representation.size, **comparison.metrics}
         row |= {"table_log_error_cosine": log_error(reference, representation.brdf)}
         rows.append(row | {"seconds": representation.seconds, "bytes_memory": representation.bytes_memory})
     return rows
@@ -64,7 +63,7 @@ def measured(path: Path, options: argparse.Namespace, environment: Any) -> list[
 def log_error(reference: BrdfTable, brdf: Brdf) -> float:
     """Of a representation at the reference's cell centres."""
     sampled = BrdfTable.sampled(brdf, reference.lattice)
-    return table_metrics(reference.values, sampled.values, reference.lattice).log_error_cosine
+    return table_metrics(reference.values, sampled.values, reference.lattice)["log_error_cosine"]
 
 
 def means(rows: Sequence[Row]) -> list[Row]:
@@ -100,7 +99,7 @@ def finite(rows: Sequence[Row]) -> list[Row]:
 
 def chosen(folder: Path, names: Sequence[str] | None) -> list[Path]:
     """The files of materials in a folder: all, or those named, with RGL's _rgb or without."""
-    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in EXTENSIONS)
+    paths = sorted(path for path in folder.iterdir() if by_extension(readable(), path))
     known = {name for path in paths for name in (path.stem, short_name(path.stem))}
     missing = [name for name in names or () if name not in known]
     if missing or not paths:

@@ -38,11 +38,12 @@ from sommerl.factored.fit import factor
 from sommerl.fitting.fit import fit
 from sommerl.fitting.options import FitOptions
 from sommerl.reflectance.brdf import Brdf
+from sommerl.reflectance.metric import decibels
 from sommerl.render.frame import Scene
 from sommerl.render.llvm import mitsuba
 from sommerl.render.metrics import image_metrics
 from sommerl.render.passes import render
-from sommerl.render.scenes import STAGES, stage
+from sommerl.render.scene_registry import SCENES, make_scene
 from sommerl.sampling.named import OURS
 
 OURS_NAME = "som-man, M = 256"
@@ -79,22 +80,24 @@ def representations(source: str) -> dict[str, Brdf]:
 def scenes(found: dict[str, Brdf], name: str, size: int) -> dict[str, Scene]:
     """The scene with each, in all of its places."""
     mi = mitsuba()
-    places = len(STAGES[name].materials)
-    made = {key: stage(name, [brdf] * places, size=size) for key, brdf in found.items()}
-    return made | {key: stage(name, [mi.load_dict(plugin)] * places, size=size) for key, plugin in BUILT_IN.items()}
+    places = SCENES[name].places
+    made = {key: make_scene(name, [brdf] * places, size=size) for key, brdf in found.items()}
+    return made | {
+        key: make_scene(name, [mi.load_dict(plugin)] * places, size=size) for key, plugin in BUILT_IN.items()
+    }
 
 
 def qualities(found: dict[str, Brdf], name: str, size: int) -> dict[str, float]:
     """PSNR over the object against the table, with the table's directions [dB]."""
-    places = len(STAGES[name].materials)
+    places = SCENES[name].places
     samplers = [OURS.fitted(found["raw table"])] * places
     images = {
-        key: render(stage(name, [brdf] * places, samplers=samplers, size=size), spp=PSNR_SPP)
+        key: render(make_scene(name, [brdf] * places, samplers=samplers, size=size), spp=PSNR_SPP)
         for key, brdf in found.items()
     }
     reference = images["raw table"]
     return {
-        key: image_metrics(reference.pixels, image.pixels, reference.mask).psnr_object_db
+        key: image_metrics(reference.pixels, image.pixels, reference.mask)["psnr_object_db"]
         for key, image in images.items()
     }
 
@@ -158,7 +161,7 @@ def show(source: str, result: dict[str, Any]) -> None:
             text(one["time"]),
             f"{one['noise']:.2f}",
             f"{one['error']:.3f}",
-            "" if one["psnr_object_db"] is None else console.decibels(one["psnr_object_db"]),
+            "" if one["psnr_object_db"] is None else decibels(one["psnr_object_db"]),
         ]
         for name, one in result["representations"].items()
     ]
@@ -175,7 +178,7 @@ def show(source: str, result: dict[str, Any]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("materials", nargs="+", metavar="MATERIAL")
-    parser.add_argument("--scene", choices=[*STAGES], default="sphere")
+    parser.add_argument("--scene", choices=[*SCENES], default="sphere")
     parser.add_argument("--size", type=int, default=256)
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--rounds", type=int, default=9)

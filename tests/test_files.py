@@ -18,6 +18,7 @@ from sommerl.factored import file as fbrdf
 from sommerl.factored.fit import FactorOptions, factor
 from sommerl.formats import fits, merl, rgl_export, scene
 from sommerl.formats.shader import source as shader
+from sommerl.formats.shader.language import LANGUAGES
 from sommerl.plots import lobes, page
 from sommerl.render.images import write_image
 from sommerl.reproduction.tables import FitRow, ImageRow
@@ -100,7 +101,7 @@ def written_by_all(folder):
     smrl.save(material, folder / "nodes.smrl")
     smrl.save(train(lambertian_table(), TrainOptions(clusters=1, epochs=1))[0], folder / "cells.smrl")
     fbrdf.save(factor(BrdfTable.sampled(builtin("chrome"), SMALL), FactorOptions(1, 1)), folder / "x.fbrdf")
-    for extension in shader.LANGUAGES:
+    for extension in LANGUAGES:
         shader.write(material, folder / f"x{extension}")
     for name, extension in (("xml", ".xml"), ("snippet", ".json")):
         scene.write("nickel", folder / f"{name}{extension}")

@@ -70,7 +70,7 @@ def paint():
 
 def error_of(brdf):
     source = BrdfTable.sampled(builtin("purple-paint"))
-    return table_metrics(source.values, BrdfTable.sampled(brdf).values, MERL).log_error_cosine
+    return table_metrics(source.values, BrdfTable.sampled(brdf).values, MERL)["log_error_cosine"]
 
 
 def test_more_nodes_are_better(paint):

@@ -109,7 +109,8 @@ def saved(**named):
         ("x.npz", saved(a=FLAT.astype(int)), "expected weights in floating point"),
         ("x.npz", saved(**arrays() | {"fc2": FLAT[:10]}), "expected layers of shapes"),
         ("x.h5", b"\x89HDF\r\n\x1a\n" + bytes(200), "expected an HDF5 file, found a damaged one"),
-        ("x.h5", b"not HDF5", "expected an archive|expected.*NumPy|found none of these"),
+        ("x.h5", b"not HDF5", "expected an HDF5 file, found another kind of file"),
+        ("x.npy", b"not NumPy", "expected a NumPy array, found another kind of file"),
     ],
 )
 def test_bad_files(tmp_path, name, content, sentence):

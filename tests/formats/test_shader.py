@@ -9,6 +9,7 @@ from shader_programs import CASES, COMPACT, A, B, compact, material, run, valida
 from sommerl import BrdfTable, Lattice, SomManBrdf, builtin
 from sommerl.compression.palette import GainsAndShapes
 from sommerl.formats.shader import source as shader
+from sommerl.formats.shader.language import CPP, GLSL, HLSL
 from sommerl.system.errors import FormatError
 
 
@@ -103,7 +104,7 @@ def test_headers_of_both_kinds_in_one_program(tmp_path):
     must_fail(check_values_along_the_normal, found, brdfs[::-1])
 
 
-GLSL = """#version 450
+GLSL_PROGRAM = """#version 450
 #include "x.glsl"
 #include "y.glsl"
 layout(location = 0) in vec3 wo;
@@ -115,7 +116,7 @@ void main() {
     color = vec4(material_x_eval(wi, wo) + material_y_eval(wi, wo), pdf + material_y_pdf(wi, wo));
 }
 """
-HLSL = """#include "x.hlsl"
+HLSL_PROGRAM = """#include "x.hlsl"
 #include "y.hlsl"
 float4 main(float3 wo : A, float3 u : B) : SV_Target {
     float pdf;
@@ -127,7 +128,7 @@ float4 main(float3 wo : A, float3 u : B) : SV_Target {
 
 SHADERS = pytest.mark.parametrize(
     ("extension", "text", "options"),
-    [("glsl", GLSL, ("-V",)), ("hlsl", HLSL, ("-V", "-D", "-S", "frag", "-e", "main"))],
+    [("glsl", GLSL_PROGRAM, ("-V",)), ("hlsl", HLSL_PROGRAM, ("-V", "-D", "-S", "frag", "-e", "main"))],
 )
 
 
@@ -153,7 +154,9 @@ def test_shaders_of_compact_materials_compile(tmp_path, case, extension, text, o
     check_shaders_compile(tmp_path, compact(case), material(*CASES[3]), extension, text, options)
 
 
-WEBGL = re.sub(r"layout\(.*\) ", "", GLSL).replace("450", "300 es\nprecision highp float;\nprecision highp int;")
+WEBGL = re.sub(r"layout\(.*\) ", "", GLSL_PROGRAM).replace(
+    "450", "300 es\nprecision highp float;\nprecision highp int;"
+)
 
 
 def test_shaders_compile_for_web_pages(tmp_path):
@@ -188,12 +191,28 @@ def test_arrays_can_live_elsewhere(tmp_path, made):
     must_fail(validate, tmp_path, BUFFERS.replace("uint words[]", "float words[]"), "-V")
 
 
+LANGUAGES = (CPP, GLSL, HLSL)
+
+
+def check_is_filled_in(text):
+    assert not re.findall("@[A-Za-z_]*@?", text)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("made", [lambda: material(*CASES[0]), lambda: material(*CASES[4]), lambda: compact("big")])
+def test_nothing_is_left_of_the_templates_marks(made, language, monkeypatch):
+    brdf = made()
+    check_is_filled_in(shader.source(brdf, language, "x"))
+    monkeypatch.setattr(shader, "OF_SAMPLER", shader.OF_SAMPLER[1:])
+    must_fail(check_is_filled_in, shader.source(brdf, language, "x"))
+
+
 def check_leaves_no_macro(text):
     defined, undefined = (set(re.findall(rf"#{word} (\w+)", text)) for word in ("define", "undef"))
     assert defined - undefined <= {"SOMMERL_REAL"}
 
 
-@pytest.mark.parametrize("language", [shader.CPP, shader.GLSL, shader.HLSL])
+@pytest.mark.parametrize("language", LANGUAGES)
 def test_no_macro_is_left_for_the_next_file(language):
     text = shader.source(compact("several bands"), language, "x")
     check_leaves_no_macro(text)
@@ -203,7 +222,7 @@ def test_no_macro_is_left_for_the_next_file(language):
 def test_a_name_cannot_break_out_of_its_comment(tmp_path):
     brdf = material(Lattice(9, 7, 11), 60, "nearest")
     brdf.name = "evil\\\nint main() { @NAME@ }"
-    text = shader.source(brdf, shader.CPP, "x")
+    text = shader.source(brdf, CPP, "x")
     assert "// evil int main() { @NAME@ }\n" in text.replace("  ", " ")
 
 

@@ -7,6 +7,7 @@ from shader_programs import CASES, compact, material, run
 
 from sommerl import builtin
 from sommerl.formats.shader import source as shader
+from sommerl.formats.shader.language import CPP
 from sommerl.sampling.half_vector import LOWEST, HalfVectorSampler
 
 
@@ -90,7 +91,7 @@ def check_defined(folder, text, real):
 
 @BOTH_PRECISIONS
 def test_nothing_is_undefined(tmp_path, real):
-    text = shader.source(compact("one node in phi_d"), shader.CPP, "material_x")
+    text = shader.source(compact("one node in phi_d"), CPP, "material_x")
     check_defined(tmp_path, text, real)
     must_fail(check_defined, tmp_path, text.replace("max(x, real(0))", "x"), real)
     must_fail(check_defined, tmp_path, text.replace("max(abs(along) + abs(across), least)", "(along + across)"), real)

@@ -18,6 +18,7 @@ from sommerl.render import scenes
 from sommerl.render.environment import LIGHTS, default_environment
 from sommerl.render.llvm import drjit, mitsuba
 from sommerl.render.passes import render
+from sommerl.render.scene_registry import SCENES, make_scene
 from sommerl.sampling.half_vector import HalfVectorSampler
 
 GOLDEN = Path(__file__).parent.parent / "golden"
@@ -42,9 +43,9 @@ class Brighter(Brdf):
 
 
 def made(name, wrap=lambda brdf: brdf, **options):
-    brdfs = [builtin(material) for material in scenes.STAGES[name].materials]
+    brdfs = [builtin(material) for material in SCENES[name].materials]
     samplers = [HalfVectorSampler.fitted(brdf) for brdf in brdfs]
-    return scenes.stage(name, [wrap(brdf) for brdf in brdfs], samplers=samplers, size=SIZE, **options)
+    return make_scene(name, [wrap(brdf) for brdf in brdfs], samplers=samplers, size=SIZE, **options)
 
 
 def in_blocks(values):

@@ -56,7 +56,7 @@ def _vectors(triple):
 
 
 def psnr(reference, candidate):
-    return compare_on_sphere(reference, [candidate], default_environment(), size=128)[0].metrics.psnr_object_db
+    return compare_on_sphere(reference, [candidate], default_environment(), size=128)[0].metrics["psnr_object_db"]
 
 
 def test_rgl_as_a_table():

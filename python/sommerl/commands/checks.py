@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..formats.load import EXTENSIONS
 from ..formats.names import split_member
+from ..formats.registry import by_extension, readable
 from ..render.checkpoint import Checkpoint
 from ..render.environment import default_environment, load_environment
 from ..render.passes import LARGEST_SIZE
@@ -23,7 +23,7 @@ MOST_SPP = 2**20
 
 def stem(source: str) -> str:
     path, member = split_member(source)
-    return member or (path.stem if path.suffix.lower() in EXTENSIONS else path.name)
+    return member or (path.stem if by_extension(readable(), path) else path.name)
 
 
 def check_output(path: Path, extensions: tuple[str, ...], *sources: str | Path | None) -> None:

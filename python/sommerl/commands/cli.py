@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .. import __version__
+from ..formats.registry import listed, readable
 from ..models.builtin import NAMES
 from ..system import threads
 from ..system.files import keeping
@@ -22,10 +23,7 @@ from .parser import Parser
 DESCRIPTION = """\
 Turns measured reflectance into small material files that render fast and look like the measurement.
 
-A MATERIAL is a file, told by its content, or the name of a built-in one. Files: Sommerl's .smrl and .fbrdf, MERL
-.binary, RGL .bsdf (isotropic), Cornell .brdf, tables of samples (.csv .npy .npz, with columns theta_i_deg,
-phi_i_deg, theta_o_deg, phi_o_deg, r, g, b), neural BRDFs (.npy .npz .h5; of an archive with several, FILE.npz:NAME),
-and fits (.json; of several, FILE.json:MODEL)."""
+A MATERIAL is a file in one of the formats below, told by its content, or the name of a built-in one."""
 
 BUILT_IN = "Built-in materials (SGD stand-ins for measured ones):\n  " + "\n  ".join(
     ", ".join(NAMES[i : i + 5]) for i in range(0, len(NAMES), 5)
@@ -83,7 +81,7 @@ def _parser() -> Parser:
     parser = Parser(
         prog="sommerl",
         description=DESCRIPTION,
-        epilog=f"{BUILT_IN}\n\n{EXAMPLES}",
+        epilog=f"Formats:\n{listed(readable())}\n\n{BUILT_IN}\n\n{EXAMPLES}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"sommerl {__version__}")

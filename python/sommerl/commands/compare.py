@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +56,7 @@ def compare(options: Namespace) -> dict[str, Any]:
     if options.output:
         write_image(options.output, side_by_side(comparison.pictures()))
     metrics = table_distance(reference, candidate)
-    result = asdict(comparison.metrics) | {f"table_{name}": value for name, value in metrics.items()}
+    result = comparison.metrics | {f"table_{name}": value for name, value in metrics.items()}
     result |= {"reference": label(reference), "candidate": label(candidate), "warnings": warnings.told}
     if options.output:
         result["image"] = str(options.output)
@@ -84,4 +83,4 @@ def table_distance(reference: Brdf, candidate: Brdf) -> dict[str, float]:
     """How far two are apart at the cell centres of one lattice: the reference's, the candidate's or MERL's."""
     lattices = [brdf.grid for brdf in (reference, candidate) if brdf.grid]
     first, second = (BrdfTable.sampled(brdf, *lattices[:1]) for brdf in (reference, candidate))
-    return asdict(table_metrics(first.values, second.values, first.lattice))
+    return table_metrics(first.values, second.values, first.lattice)

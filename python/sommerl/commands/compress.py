@@ -16,6 +16,7 @@ from ..formats.load import load, load_table
 from ..reflectance.brdf import Brdf
 from ..reflectance.distance import table_metrics
 from ..reflectance.info import Counts
+from ..reflectance.metric import decibels
 from ..reflectance.table import BrdfTable
 from ..render.compress import compress as compressed
 from ..system.errors import MaterialError, OptionError, SommerlError
@@ -172,7 +173,7 @@ def trained(table: BrdfTable, options: TrainOptions) -> tuple[SomManBrdf, TrainR
     with console.progress(f"training {table.name}") as advance:
         material, report = train(table, options, progress=advance)
     metrics = table_metrics(table.values, material.values, table.lattice)
-    measured = asdict(metrics) | {"quantisation_error": report.quantisation_error[-1]}
+    measured = metrics | {"quantisation_error": report.quantisation_error[-1]}
     material.metrics = {name: _rounded(value) for name, value in measured.items()}
     facts = table.facts | (asdict(table.counts) if table.cells_clamped else {})
     if facts:
@@ -204,7 +205,7 @@ def compact_rows(material: SomManBrdf, bytes_disk: int, report: CompactReport, c
     rows = {
         "nodes": str(material.lattice.size),
         "palette": f"{material.clusters - len(material.lut)} gains, {len(material.lut)} shapes",
-        "PSNR, object, on a sphere": console.decibels(report.psnr_db) if report.psnr_db is not None else "not measured",
+        "PSNR, object, on a sphere": decibels(report.psnr_db) if report.psnr_db is not None else "not measured",
         "size in memory": console.size(material.bytes_memory),
         "size on disk": console.size(bytes_disk),
     }

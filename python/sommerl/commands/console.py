@@ -86,8 +86,3 @@ def size(count: int) -> str:
     if count < 1000:
         return f"{count} B"
     return f"{count / 1e3:.1f} kB" if count < 1e6 else f"{count / 1e6:.2f} MB"
-
-
-def decibels(value: float) -> str:
-    """A PSNR; identical images have none."""
-    return "identical" if value == float("inf") else f"{value:.2f} dB"

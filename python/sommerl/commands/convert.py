@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from ..compression.material import SomManBrdf
 from ..compression.paper.options import TrainOptions
-from ..compression.smrl import file as smrl
-from ..formats import merl, rgl_export, scene
+from ..formats import registry, rgl, rgl_export, smrl
+from ..formats.format import Format
 from ..formats.load import load
 from ..formats.scattered import ScatteredTable
-from ..formats.shader import source as shader
 from ..models.builtin import NAMES, builtin_table
 from ..plots import coverage
 from ..reflectance.brdf import Brdf
@@ -27,31 +25,20 @@ from .compress import compress_one, trained
 from .parser import command
 from .rows import clamped_text, fact_rows
 
-EXTENSIONS = {
-    ".smrl": "Sommerl, compressed with the defaults of compress if need be",
-    ".binary": "MERL",
-    ".bsdf": "RGL, for the `measured` materials of Mitsuba and pbrt-v4",
-    **dict.fromkeys(shader.LANGUAGES, "source code with an eval, compressed first if need be"),
-    ".xml": "Mitsuba scene snippet that loads IN",
-    ".json": "the same for load_dict",
-}
-
-SNIPPETS = (".xml", ".json")
 MOSTLY = 0.5
 
 
 def convert(options: Namespace) -> dict[str, Any]:
-    _check(options)
+    kind = _checked(options)
     brdf = load(options.input) if options.noise is None else builtin_table(options.input, noise=options.noise)
     output: Path = options.output
-    extension = output.suffix.lower()
-    report = {} if extension in SNIPPETS else _report(brdf, output)
-    if extension == ".smrl" and not isinstance(brdf, SomManBrdf):
+    report = {} if kind.names_source else _report(brdf, output)
+    if kind is smrl.FORMAT and not isinstance(brdf, SomManBrdf):
         result = compress_one(BrdfTable.of(brdf), output, TrainOptions(), options.json)
     else:
-        written = _write(brdf, options, extension)
+        written = _write(brdf, kind, options)
         size = output.stat().st_size if output.is_file() else None  # of what went through a pipe
-        counts = Counts() if extension in SNIPPETS else written.counts
+        counts = Counts() if kind.names_source else written.counts
         result = {"output": str(output), "bytes_disk": size, **asdict(counts)}
         if not options.json:
             told = f", cells clamped to 0: {clamped_text(counts)}" if counts.cells_clamped else ""
@@ -62,39 +49,35 @@ def convert(options: Namespace) -> dict[str, Any]:
     return result | report
 
 
-def _check(options: Namespace) -> None:
-    """Raises OptionError for what cannot be asked for."""
+def _checked(options: Namespace) -> Format:
+    """The format to write. Raises OptionError for what cannot be asked for."""
     if options.noise is not None and (options.input not in NAMES or Path(options.input).exists()):
         raise OptionError(f"noise: expected a built-in material, found {options.input}")
     if options.noise is not None and options.noise < 0:
         raise OptionError(f"noise: expected a seed of at least 0, found {options.noise}")
-    extension = options.output.suffix.lower()
-    if options.spectral and extension != ".bsdf":
+    kind = registry.by_extension(registry.writable(), options.output)
+    if options.spectral and kind is not rgl.FORMAT:
         raise OptionError(f"spectral: expected an output that ends in .bsdf, found {options.output}")
-    if extension in SNIPPETS and options.noise is not None:
+    if kind and kind.names_source and options.noise is not None:
         raise OptionError("noise: expected an output that holds the material, found a scene snippet")
-    check_output(options.output, tuple(EXTENSIONS), options.input)
+    check_output(options.output, registry.extensions(registry.writable()), options.input)
+    assert kind  # or the check has said which ones there are
+    return kind
 
 
-def _write(brdf: Brdf, options: Namespace, extension: str) -> Brdf:
-    """Writes a material; returns what it was turned into for that."""
+def _write(brdf: Brdf, kind: Format, options: Namespace) -> Brdf:
+    """Writes a material; returns what the file holds, or names."""
+    assert kind.write
     output: Path = options.output
-    if isinstance(brdf, SomManBrdf) and extension == ".smrl":
-        smrl.save(brdf, output)
+    if kind.names_source:
+        kind.write(options.input, output)
         return brdf
-    if extension == ".binary":
-        table = merl.resampled(brdf)
-        merl.write(table, output)
-        return table
-    if extension == ".bsdf":
-        rgl_export.write(brdf, output, spectral=options.spectral)
+    if options.spectral:
+        rgl_export.write(brdf, output, spectral=True)
         return brdf
-    if extension in shader.LANGUAGES:
-        material = brdf if isinstance(brdf, SomManBrdf) else trained(BrdfTable.of(brdf), TrainOptions())[0]
-        shader.write(material, output)
-        return material
-    scene.write(options.input, output)
-    return brdf
+    if kind.compressed and not isinstance(brdf, SomManBrdf):
+        brdf = trained(BrdfTable.of(brdf), TrainOptions())[0]
+    return kind.write(brdf, output)
 
 
 def _report(brdf: Brdf, output: Path) -> dict[str, Any]:
@@ -124,7 +107,12 @@ def arguments(add: Any) -> None:
     summary = "Converts a material into the format that the output's extension names."
     example = "sommerl convert samples.csv samples.binary\n  sommerl convert nickel.smrl nickel.h"
     parser = command(add, "convert", convert, summary, example)
-    parser.epilog = f"{_listed(EXTENSIONS)}\n\n{parser.epilog}"
+    written = registry.writable()
+    compressed = " ".join(registry.extensions(each for each in written if each.compressed))
+    parser.epilog = (
+        f"Formats of OUT, by its extension:\n{registry.listed(written)}\n"
+        f"For {compressed}, IN is compressed with the defaults of `compress` if it is not yet.\n\n{parser.epilog}"
+    )
     parser.add_argument("input", metavar="IN", help="a material: path or built-in name")
     parser.add_argument("output", type=Path, metavar="OUT", help="a name with one of the extensions below")
     parser.add_argument(
@@ -133,9 +121,3 @@ def arguments(add: Any) -> None:
     parser.add_argument(
         "--noise", type=int, metavar="SEED", help="add the measurement error of MERL's data to a built-in material"
     )
-
-
-def _listed(extensions: Mapping[str, str]) -> str:
-    """Extensions, and what is written for each; those with one meaning together."""
-    meanings = {text: " ".join(key for key in extensions if extensions[key] == text) for text in extensions.values()}
-    return "Extensions of OUT:\n" + "\n".join(f"  {keys:24}{text}" for text, keys in meanings.items())

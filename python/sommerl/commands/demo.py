@@ -77,7 +77,7 @@ def demo(options: Namespace) -> dict[str, Any]:
     return (
         describe(material, written)
         | asdict(report)
-        | asdict(comparison.metrics)
+        | comparison.metrics
         | {"epochs": TrainOptions().epochs, "seconds_render": seconds}
         | {"output": {key: str(path) for key, path in paths.items()}}
     )

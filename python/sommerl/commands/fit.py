@@ -15,6 +15,7 @@ from ..fitting.options import MOST_LOBES, FitOptions, Loss, Sampling, families_o
 from ..formats import fits
 from ..formats.load import load
 from ..models.multi_lobe import FAMILIES
+from ..reflectance.metric import decibels
 from ..render.compare import compare_on_sphere
 from ..render.environment import default_environment
 from . import console
@@ -96,7 +97,7 @@ def fit(options: Namespace) -> dict[str, Any]:
                 brdf, [each.brdf for each in found], default_environment(), progress=advance
             )
         for row, comparison in zip(result["fits"], comparisons, strict=True):
-            row["psnr_object_db"] = comparison.metrics.psnr_object_db
+            row["psnr_object_db"] = comparison.metrics["psnr_object_db"]
         plots.fits(brdf.name, [each.model for each in found], comparisons, options.picture)
     if options.output:
         fits.write(options.output, brdf.name, result["fits"])
@@ -111,7 +112,7 @@ def print_fits(title: str, rows: Sequence[Mapping[str, Any]], fits: Sequence[Fit
     columns = ["model", "lobes", "error", "relative", *(["PSNR, object"] if rendered else []), "time"]
     table: list[list[str]] = []
     for row, fit in zip(rows, fits, strict=True):
-        psnr = [console.decibels(row["psnr_object_db"])] if rendered else []
+        psnr = [decibels(row["psnr_object_db"])] if rendered else []
         numbers = [str(row["lobes"]), f"{fit.error:.4g}", f"{fit.relative_error:.4f}", *psnr, f"{fit.seconds:.1f} s"]
         table.append([fit.model, *numbers])
     console.print_table(title, columns, table)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+import textwrap
 import time
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import compress
 from pathlib import Path
@@ -15,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..formats.load import EXTENSIONS, load
+from ..formats.load import load
+from ..formats.registry import by_extension, readable
 from ..models.builtin import NAMES
 from ..plots.contact_sheet import captioned, tiled
 from ..reflectance.brdf import Brdf
@@ -28,7 +30,7 @@ from ..render.llvm import mitsuba
 from ..render.meshes import Mesh, load_mesh
 from ..render.metrics import exposure, flip_map, to_srgb8
 from ..render.passes import DEFAULT_SIZE, DEFAULT_SPP, render_all
-from ..render.scenes import STAGES, stage
+from ..render.scene_registry import SCENES, make_scene
 from ..sampling import named
 from ..sampling.named import OURS, SAMPLERS
 from ..sampling.sampler import Sampler
@@ -47,20 +49,10 @@ from .console import Warnings
 from .parser import command, rendering_options
 from .rows import image_rows, label, table_rows
 
-GRID = "grid"
 DEFAULTS = {"scene": "sphere", "spp": DEFAULT_SPP, "size": DEFAULT_SIZE, "sampler": named.OURS.name}
 MOST_PIXELS = 2**26  # of a sheet
 MOST_COMPARED = 2**23  # of one that is compared: the metrics take some 260 bytes for each
 WIDEST = 2048  # pixels that the four pictures of a comparison may take in one row
-
-SCENES = f"""Scenes:
-  sphere      one material on a sphere in the environment
-  statue      one material on a carved figure, or on --mesh, on a grey plane in the environment; global illumination
-  still-life  three: a bowl and a ball, a knot and a ball, a vase and a ball, under area lights of their own, with
-              interreflection ({", ".join(STAGES["still-life"].materials)})
-  grid        any number on spheres, each as `sphere` has it, at one exposure, with labels in the PNG; a folder stands
-              for the material files in it, of which those that cannot be read are named and left out; if no material
-              is given, all built-in ones"""
 
 FILES = """Files:
   --size is that of the frame; of each sphere in a grid. A render of more than ten seconds keeps what it has reached in
@@ -139,7 +131,7 @@ def _render(options: Namespace) -> dict[str, Any]:
     comparison = _compared(options, pairs, references, candidates) if references else None
     exposed_as = comparison.reference if comparison else _sheet(candidates)
     scale = exposure(exposed_as.pixels, exposed_as.mask)
-    caption = pairs if options.scene == GRID else []
+    caption = pairs if SCENES[options.scene].each else []
     _write(options.output, candidates, scale, caption)
     result: dict[str, Any] = {"image": str(options.output), "seconds": seconds, "spp": options.spp}
     result |= {"variant": mitsuba().variant(), "scene": options.scene, "sampler": options.sampler}
@@ -149,7 +141,7 @@ def _render(options: Namespace) -> dict[str, Any]:
         _write(outputs["reference"], references, scale, caption)
         names = _held_against(pairs, labels)
         _write_against(outputs, comparison, names)
-        result |= asdict(comparison.metrics) | {"reference": names[0], "candidate": names[1]}
+        result |= comparison.metrics | {"reference": names[0], "candidate": names[1]}
         result |= {f"{name}_image": str(path) for name, path in outputs.items()}
         rows = image_rows(comparison.metrics)
         held = [pair for pair in pairs if pair.against is not None]
@@ -185,18 +177,19 @@ def _outputs(options: Namespace, pairs: Sequence[Pair]) -> dict[str, Path]:
 def _pairs(options: Namespace) -> list[Pair]:
     """The materials of the scene, in order, each with its reference."""
     given: list[str] = options.materials
-    if options.scene == GRID:
-        sources = [file for source in given for file in _files(source)] or list(NAMES)
+    kind = SCENES[options.scene]
+    own = kind.materials
+    if kind.each:
+        sources = [file for source in given for file in _files(source)] or list(own)
+    elif len(given) > len(own):
+        raise OptionError(f"materials: expected at most {len(own)} in {options.scene}, found {len(given)}")
     else:
-        own = STAGES[options.scene].materials
-        if len(given) > len(own):
-            raise OptionError(f"materials: expected at most {len(own)} in {options.scene}, found {len(given)}")
         sources = given + list(own[len(given) :])
     if len(options.against) > len(sources):
         raise OptionError(f"against: expected at most {len(sources)}, found {len(options.against)}")
     against = options.against + [None] * (len(sources) - len(options.against))
     return [
-        Pair(source, reference, options.scene == GRID or number < len(given))
+        Pair(source, reference, kind.each or number < len(given))
         for number, (source, reference) in enumerate(zip(sources, against, strict=True))
     ]
 
@@ -207,7 +200,7 @@ def _files(source: str) -> Iterator[str]:
     if source in NAMES or not folder.is_dir():
         yield source
         return
-    files = sorted(str(path) for path in folder.iterdir() if path.suffix.lower() in EXTENSIONS and path.is_file())
+    files = sorted(str(path) for path in folder.iterdir() if by_extension(readable(), path) and path.is_file())
     if not files:
         raise MaterialError(f"{source}: expected a folder with materials, found none in it")
     yield from files
@@ -248,7 +241,7 @@ def _looked_at(
 
 
 def _setting(options: Namespace, warn: Callable[[str], None]) -> Setting:
-    taken = STAGES["sphere" if options.scene == GRID else options.scene]
+    taken = SCENES[options.scene]
     for name, allowed, what in (("mesh", taken.mesh, "objects"), ("envmap", taken.environment, "lights")):
         if getattr(options, name) and not allowed:
             raise OptionError(f"{options.scene}: expected no --{name}, since it has {what} of its own, found one")
@@ -265,8 +258,7 @@ def _rendered(
 
     Both are rendered with the references' samplers and the same seed, hence with the same directions.
     """
-    name = "sphere" if options.scene == GRID else options.scene
-    frames = [[pair] for pair in pairs] if options.scene == GRID else [pairs]
+    frames = [[pair] for pair in pairs] if SCENES[options.scene].each else [pairs]
 
     @lru_cache(maxsize=len(pairs) if len(frames) == 1 else 1)
     def fitted(pair: Pair) -> Sampler:
@@ -275,8 +267,13 @@ def _rendered(
     def make(frame: Sequence[Pair], which: int) -> Scene:
         samplers = [fitted(pair) for pair in frame]
         brdfs = [materials.both(pair)[which] for pair in frame]
-        return stage(
-            name, brdfs, samplers=samplers, environment=setting.environment, mesh=setting.mesh, size=options.size
+        return make_scene(
+            options.scene,
+            brdfs,
+            samplers=samplers,
+            environment=setting.environment,
+            mesh=setting.mesh,
+            size=options.size,
         )
 
     compared = [any(pair.against is not None for pair in frame) for frame in frames]
@@ -298,7 +295,7 @@ def _compared(
     options: Namespace, pairs: Sequence[Pair], references: Sequence[Image], candidates: Sequence[Image]
 ) -> Comparison:
     """The images of a scene, or those spheres of a grid that have a reference, each without empty places."""
-    if options.scene == GRID:
+    if SCENES[options.scene].each:
         held = [pair.against is not None for pair in pairs]
         references, candidates = (list(compress(images, held)) for images in (references, candidates))
     with console.progress("comparing"):
@@ -353,6 +350,15 @@ def _write_against(outputs: dict[str, Path], comparison: Comparison, names: tupl
     write_image(outputs["against"], captioned(list(pictures.items()), columns, notes))
 
 
+def _scenes() -> str:
+    """All scenes, what they show, and their own materials where there are several."""
+    lines: list[str] = []
+    for name, kind in SCENES.items():
+        own = f" ({', '.join(kind.materials)})" if kind.places > 1 else ""
+        lines.append(textwrap.fill(kind.summary + own, 118, initial_indent=f"  {name:12}", subsequent_indent=" " * 14))
+    return "\n".join(lines)
+
+
 def arguments(add: Any) -> None:
     """Adds the command to the command line."""
     summary = "Renders materials in a scene, or a scene of your own. PNG is exposed for the objects; EXR is linear."
@@ -361,7 +367,7 @@ def arguments(add: Any) -> None:
   sommerl render --scene statue --mesh buddha.obj blue.smrl --against blue.binary -o blue.png
   sommerl render --scene grid FOLDER --size 128 -o sheet.png"""
     parser = command(add, "render", render, summary, example)
-    parser.epilog = f"{SCENES}\n\n{FILES}\n\n{render_own.FILES}\n\n{parser.epilog}"
+    parser.epilog = f"Scenes:\n{_scenes()}\n\n{FILES}\n\n{render_own.FILES}\n\n{parser.epilog}"
     parser.add_argument(
         "materials",
         nargs="*",
@@ -369,7 +375,7 @@ def arguments(add: Any) -> None:
         help="as many as the scene takes, the rest are the scene's own; or SCENE.xml, a scene of your own",
     )
     default = DEFAULTS["scene"]
-    parser.add_argument("--scene", choices=[*STAGES, GRID], help=f"({default})")
+    parser.add_argument("--scene", choices=[*SCENES], help=f"({default})")
     parser.add_argument("-o", "--output", type=Path, required=True, help="a .png or .exr file")
     parser.add_argument(
         "--against",

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+from ..reflectance import metric
 from ..reflectance.brdf import Brdf
+from ..reflectance.distance import TABLE_METRICS
 from ..reflectance.info import Counts
-from ..render.metrics import ImageMetrics
-from . import console
+from ..render.metrics import METRICS
 
 
 def clamped_text(counts: Counts) -> str:
@@ -77,21 +78,10 @@ def text(value: Any) -> str:
 
 
 def table_rows(metrics: Mapping[str, float]) -> dict[str, str]:
-    """Distances between two tables: the fields of `TableMetrics`."""
-    return {
-        "table: RMSE [1/sr]": f"{metrics['rmse']:.3g}",
-        "table: log error, cosine-weighted": f"{metrics['log_error_cosine']:.4f}",
-        "table: relative error": f"{metrics['relative_error']:.3g}",
-    }
+    """Distances between two tables, by the keys of `distance.TABLE_METRICS`."""
+    return metric.rows(TABLE_METRICS, metrics)
 
 
-def image_rows(metrics: ImageMetrics) -> dict[str, str]:
-    """Distances between two renderings."""
-    return {
-        "PSNR, object": console.decibels(metrics.psnr_object_db),
-        "PSNR, frame": console.decibels(metrics.psnr_frame_db),
-        "PSNR, object, not rounded to 8 bits": console.decibels(metrics.psnr_unrounded_db),
-        "SSIM": f"{metrics.ssim:.4f}",
-        "ΔE_ITP": f"{metrics.delta_e_itp:.2f}",
-        "FLIP": f"{metrics.flip:.4f}",
-    }
+def image_rows(metrics: Mapping[str, float]) -> dict[str, str]:
+    """Distances between two renderings, by the keys of `metrics.METRICS`."""
+    return metric.rows(METRICS, metrics)

@@ -17,6 +17,7 @@ from ..reflectance.table import BrdfTable
 from ..system import door
 from ..system.errors import FormatError
 from ..system.visible import visible
+from .format import Format
 from .scattered import to_table
 from .spectra import srgb_weights
 from .text import LARGEST_FILE, rows, text_of, uncommented
@@ -36,7 +37,7 @@ def read(path: str | Path) -> BrdfTable:
 
 
 def parse(path: Path, data: bytes) -> BrdfTable:
-    """The same of a file's bytes."""
+    """As `read`, from the file's bytes; the path is for names and messages alone."""
     lines = uncommented(text_of(path, data))
     if not lines or not re.fullmatch(r"\d{1,9}", lines[0]) or not 2 <= int(lines[0]) <= MOST_WAVELENGTHS:
         found = repr(lines[0][:20]) if lines else "nothing"
@@ -61,3 +62,14 @@ def parse(path: Path, data: bytes) -> BrdfTable:
         )
     except FormatError as error:
         raise FormatError(f"{path}: {error}") from error
+
+
+FORMAT = Format(
+    "Cornell",
+    (".brdf",),
+    "scattered samples of spectra",
+    needs="formats",
+    sniff=looks_like,
+    read=parse,
+    largest=LARGEST_FILE,
+)

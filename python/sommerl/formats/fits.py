@@ -15,6 +15,7 @@ from ..system import door
 from ..system.errors import FormatError, MaterialError
 from ..system.files import atomic_write
 from ..system.visible import visible
+from .format import Format
 
 KEY, VERSION = "sommerl_fits", 1
 LARGEST_FILE = 2**24  # bytes
@@ -22,6 +23,7 @@ MOST_LOBES, LONGEST_NAME = 100, 200
 
 
 def looks_like(head: bytes) -> bool:
+    """Whether a file that starts with these bytes is JSON with the key of fits."""
     return head.lstrip().startswith(b"{") and f'"{KEY}"'.encode() in head
 
 
@@ -41,7 +43,7 @@ def read(path: str | Path, member: str = "") -> MultiLobe:
 
 
 def parse(path: Path, data: bytes, member: str = "") -> MultiLobe:
-    """The same of a file's bytes."""
+    """As `read`, from the file's bytes; the path is for names and messages alone."""
     try:
         found = json.loads(data)
     except (ValueError, RecursionError) as error:
@@ -102,3 +104,14 @@ def _sequence(path: Path, field: str, value: Any) -> list[Any]:
     if not isinstance(value, list) or len(cast(list[Any], value)) > MOST_LOBES:
         raise FormatError(f"{path}: {field}: expected a list of at most {MOST_LOBES}, found something else")
     return cast(list[Any], value)
+
+
+FORMAT = Format(
+    "fits",
+    (".json",),
+    "analytic models, which `fit` writes; FILE.json:MODEL is one",
+    sniff=looks_like,
+    read=parse,
+    largest=LARGEST_FILE,
+    members=True,
+)

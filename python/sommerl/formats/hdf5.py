@@ -1,5 +1,7 @@
-"""Small arrays in HDF5 files, and nothing else: no links but those by which a file holds its own objects, no data that
-lies elsewhere, no filters that would be loaded for the occasion, and an end to depth and number.
+"""Reads small arrays from HDF5 files, which may be hostile.
+
+Only arrays that a file itself holds are read: links to other places, data in other files, and filters that the library
+would have to load are refused. The depth of groups and the number of items are bounded.
 """
 
 from __future__ import annotations

@@ -19,6 +19,7 @@ from ..system import door
 from ..system.errors import FormatError, MaterialError
 from ..system.files import atomic_write
 from ..system.visible import visible
+from .format import Format
 
 LATTICES: dict[tuple[int, ...], Lattice] = {
     (90, 90, 180): Lattice(),
@@ -49,7 +50,7 @@ def read(path: str | Path) -> MerlTable:
 
 
 def parse(path: Path, data: bytes) -> MerlTable:
-    """The same of a file's bytes."""
+    """As `read`, from the file's bytes; the path is for names and messages alone."""
     if len(data) < HEADER_BYTES:
         raise FormatError(f"{path}: expected a MERL header of {HEADER_BYTES} bytes, found {len(data)}")
     dimensions = _dimensions(data)
@@ -114,3 +115,20 @@ def _reachable(lattice: Lattice) -> NDArray[np.bool_]:
 
 def _dimensions(head: bytes) -> tuple[int, ...]:
     return tuple(np.frombuffer(head[:HEADER_BYTES], "<i4").tolist())
+
+
+def _write_resampled(brdf: Brdf, path: Path) -> BrdfTable:
+    table = resampled(brdf)
+    write(table, path)
+    return table
+
+
+FORMAT = Format(
+    "MERL",
+    (".binary",),
+    "a table of 90 × 90 × 180 or 360 cells",
+    sniff=looks_like,
+    read=parse,
+    largest=LARGEST_FILE,
+    write=_write_resampled,
+)

@@ -1,4 +1,4 @@
-"""Names of files, and of what is in them."""
+"""How a material in a file is named on the command line: FILE, or FILE:NAME for one of several."""
 
 from __future__ import annotations
 
@@ -7,9 +7,13 @@ from pathlib import Path
 
 
 def split_member(source: str | Path) -> tuple[Path, str]:
-    """A file, and which of the materials in it: "FILE:NAME", where FILE exists and "FILE:NAME" does not."""
+    """The file and the name of a material in it, from "FILE:NAME"; the name is "" where only a file is named.
+
+    A colon may also be part of a file's own name. So the whole text is taken for a file's name if such a file exists,
+    and else is split at the first colon before which there is the name of a file.
+    """
     text = str(source)
-    if not os.path.exists(text):  # unlike a Path's, it takes all that is no name for none
+    if not os.path.exists(text):  # os.path takes any text for a name; Path raises ValueError for some
         for at, character in enumerate(text):
             if character == ":" and os.path.isfile(text[:at]):
                 return Path(text[:at]), text[at + 1 :]

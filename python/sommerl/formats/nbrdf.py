@@ -22,6 +22,7 @@ from ..system import door
 from ..system.errors import FormatError, MaterialError
 from ..system.visible import visible
 from . import hdf5
+from .format import Format
 from .numpy_files import MAGIC, read_npy, read_npz
 
 ARRAYS = ("fc1", "b1", "fc2", "b2", "fc3", "b3")
@@ -35,7 +36,8 @@ def read(path: str | Path, member: str = "") -> NeuralBrdf:
 
 
 def parse(path: Path, data: bytes, member: str = "") -> NeuralBrdf:
-    """The same of a file's bytes; of NAME_fc1.npy, the other arrays are read beside it."""
+    """As `read`, from the file's bytes. Of NAME_fc1.npy and the like, the other five arrays are read from files beside
+    it."""
     try:
         if hdf5.looks_like(data):
             return _layers(_keras(path, data), visible(path.stem))
@@ -97,3 +99,20 @@ def _keras(path: Path, data: bytes) -> dict[str, NDArray[Any]]:
         raise FormatError(f"{path}: expected dense layers of shapes {SHAPES} with biases, found {list(found)}")
     ordered = [found[shape][part] for shape in SHAPES for part in ("kernel", "bias")]
     return dict(zip(ARRAYS, ordered, strict=True))
+
+
+def _hdf5(path: Path, data: bytes) -> NeuralBrdf:
+    if not hdf5.looks_like(data):
+        raise FormatError(f"{path}: expected an HDF5 file, found another kind of file")
+    return parse(path, data)
+
+
+FORMAT = Format(
+    "neural BRDF",
+    (".h5", ".hdf5"),
+    "a Keras model of three dense layers",
+    needs="formats",
+    sniff=hdf5.looks_like,
+    read=_hdf5,
+    largest=LARGEST_FILE,
+)

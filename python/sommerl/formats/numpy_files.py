@@ -24,9 +24,14 @@ MOST_ARRAYS, MOST_AXES = 4096, 8
 LARGEST_FILE = LARGEST_ARRAY + 2**20  # bytes: with the names of all arrays
 
 
-def looks_like(head: bytes) -> bool:
-    """Whether a file that starts with these bytes says that it is one of the two."""
-    return head.startswith((MAGIC, ZIP_MAGIC))
+def is_array(head: bytes) -> bool:
+    """Whether a file that starts with these bytes says that it is a .npy file."""
+    return head.startswith(MAGIC)
+
+
+def is_archive(head: bytes) -> bool:
+    """Whether a file that starts with these bytes says that it is an archive, as .npz files are."""
+    return head.startswith(ZIP_MAGIC)
 
 
 def read_npy(path: Path, data: bytes) -> NDArray[Any]:

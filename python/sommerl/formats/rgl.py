@@ -31,6 +31,7 @@ from ..system import door
 from ..system.errors import FormatError
 from ..system.visible import visible
 from . import tensor
+from .format import Format
 from .spectra import srgb_weights
 
 LARGEST_SIDE = 4096  # of any grid in a file
@@ -212,7 +213,7 @@ def read(path: str | Path, *, reciprocal: bool = True) -> RglBrdf:
 
 
 def parse(path: Path, data: bytes, *, reciprocal: bool = True) -> RglBrdf:
-    """The same of a file's bytes."""
+    """As `read`, from the file's bytes; the path is for names and messages alone."""
     file = tensor.TensorFile(path, data)
     colours = "rgb" if "rgb" in file.fields else "spectra"
     _check(file, colours)
@@ -304,12 +305,12 @@ def _unit(f: Any, theta: Array) -> Array:
 
 
 def _segment(t: Array, a: Array, b: Array, points: int) -> Array:
-    """The integral of a density that runs from a to b between two of so many points, up to the share t of the way."""
+    """The integral of a density that runs from a to b between two neighbours of `points` points, up to the share t."""
     return t * (a + 0.5 * t * (b - a)) * (1.0 / (points - 1))
 
 
 def _cell(f: Any, x: Array, points: int) -> tuple[Array, Array]:
-    """The point below x in [0, 1], of so many, and the share of the way to the next."""
+    """Of `points` points spread over [0, 1], the one at or below x, and the share of the way to the next."""
     x = f.minimum(f.maximum(x, 0.0), 1.0) * (points - 1)
     below = f.minimum(f.floor(x), points - 2.0)
     return f.bin(below, points - 1), x - below
@@ -331,3 +332,21 @@ def _corners(f: Any, x: Array, y: Array, shape: tuple[int, ...]) -> list[tuple[A
 
 def _blend(f: Any, buffer: Any, offset: Any, corners: list[tuple[Array, Array]]) -> Array:
     return sum(weight * f.gather(buffer, offset + at) for at, weight in corners)
+
+
+def _write(brdf: Brdf, path: Path) -> Brdf:
+    from . import rgl_export  # which needs what is above
+
+    rgl_export.write(brdf, path)
+    return brdf
+
+
+FORMAT = Format(
+    "RGL",
+    (".bsdf",),
+    "an isotropic measurement, RGB or spectral; `measured` in Mitsuba and pbrt-v4",
+    sniff=looks_like,
+    read=parse,
+    largest=tensor.LARGEST_FILE,
+    write=_write,
+)

@@ -143,7 +143,8 @@ def _warped(
 
 
 def _share(area: NDArray[Any], a: NDArray[Any], b: NDArray[Any], points: int) -> NDArray[Any]:
-    """How far between two of so many points an area lies under a density that runs from a to b."""
+    """Where, as a share of the way between two neighbours of `points` points, a density that runs from a to b has
+    gathered an area: the inverse of `rgl._segment`."""
     area = np.maximum(area, 0) * (points - 1)
     return np.clip(2 * area / np.maximum(a + np.sqrt(np.maximum(a * a + 2 * (b - a) * area, 0)), 1e-300), 0, 1)
 

@@ -22,6 +22,7 @@ from ..system import door
 from ..system.errors import FormatError
 from ..system.visible import visible
 from . import numpy_files
+from .format import Format
 from .scattered import to_table
 from .text import LARGEST_FILE, rows, text_of, uncommented
 
@@ -33,8 +34,9 @@ NAMES = {"red": "r", "green": "g", "blue": "b"}
 
 
 def looks_like(head: bytes) -> bool:
-    """Whether a file that starts with these bytes names columns of angles."""
-    return _header(head.decode("utf-8-sig", "replace"))[0] is not None
+    """Whether a file that starts with these bytes is a text that names columns of angles, and no JSON."""
+    text = head.decode("utf-8-sig", "replace")
+    return "\0" not in text and not text.lstrip().startswith("{") and _header(text)[0] is not None
 
 
 def are_columns(names: Any) -> bool:
@@ -48,7 +50,7 @@ def read(path: str | Path) -> BrdfTable:
 
 
 def parse(path: Path, data: bytes) -> BrdfTable:
-    """The same of a file's bytes."""
+    """As `read`, from the file's bytes; the path is for names and messages alone."""
     if data.startswith(numpy_files.MAGIC):
         columns = _fields(path, numpy_files.read_npy(path, data))
     elif data.startswith(numpy_files.ZIP_MAGIC):
@@ -167,3 +169,14 @@ def _check_range(name: str, numbers: NDArray[np.float64], column: str, unit: str
         hint = "" if unit == "deg" else f" (a column in degrees is named {column}_deg)"
         wanted = f"angles from {low:.6g} to {high:.6g} {unit}{hint}"
         raise FormatError(f"{name}: expected {wanted}, found {numbers[row - 1]:g} in row {row} of the data")
+
+
+FORMAT = Format(
+    "samples",
+    (".csv",),
+    "columns theta_i_deg, phi_i_deg, theta_o_deg, phi_o_deg, r, g, b",
+    needs="formats",
+    sniff=looks_like,
+    read=parse,
+    largest=LARGEST_FILE,
+)

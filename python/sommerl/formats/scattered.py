@@ -45,10 +45,10 @@ class ScatteredTable(BrdfTable):
 
 
 def to_table(samples: Samples, *, name: str, source_sha256: str | None = None, lattice: Lattice = MERL) -> BrdfTable:
-    """The table nearest to so many samples. Those at the horizon itself, where nothing can be measured, are left out.
+    """The table that is fitted to samples. Those at the horizon itself, where nothing can be measured, are left out.
 
-    Planes may go below 0, where samples do or between them: such cells are set to 0 and counted in `cells_clamped`,
-    among the table's own cells those that are interpolated from one.
+    A fitted plane may be negative, where samples are or between them. Such values are set to 0, and `cells_clamped`
+    counts the table's cells that are interpolated from one.
 
     Its facts: samples, those at different directions; samples_at_the_horizon, those left out; samples_negative, those
     with a channel below 0, which the planes are fitted to as they are; mirrored, whether they
@@ -120,7 +120,11 @@ def _clamped(coarse: Lattice, values: NDArray[np.float64], table: BrdfTable) -> 
 
 
 def _merged(samples: Samples) -> Samples:
-    """The same, with the mean of samples that are the same pair of directions to a reciprocal, isotropic material."""
+    """Samples at different directions: repeated ones are replaced by their mean.
+
+    Two are the same if they differ by a turn about the normal or by the order of the directions, which make no
+    difference to a reciprocal, isotropic material.
+    """
     places = np.rint(_coordinates(split(samples.wi), split(samples.wo)) / SAME).astype(np.int64)
     _, first, group, count = np.unique(
         places @ (1 << np.array([0, 15, 30, 45])), return_index=True, return_inverse=True, return_counts=True
@@ -132,8 +136,11 @@ def _merged(samples: Samples) -> Samples:
 
 
 def _both_sides(samples: Samples) -> tuple[Samples, bool]:
-    """The same samples; where all lie on one side of the plane of incidence, as instruments that rely on the symmetry
-    of a material to its mirror image measure them, with their mirror images."""
+    """Samples on both sides of the plane of incidence, and whether mirror images were added for that.
+
+    Instruments that rely on the mirror symmetry of isotropic materials measure one side alone; to such samples their
+    mirror images are added.
+    """
     (x, y), (u, v) = samples.wi[:, :2].T, samples.wo[:, :2].T
     azimuth = np.arctan2(x * v - y * u, x * u + y * v)
     aside = (np.abs(np.sin(azimuth)) > IN_PLANE) & (np.minimum(np.hypot(x, y), np.hypot(u, v)) > IN_PLANE)

@@ -6,12 +6,12 @@ import json
 import os
 from pathlib import Path
 from typing import Any, cast
-from xml.sax.saxutils import quoteattr
 
 from ..system import door
 from ..system.errors import FormatError
 from ..system.files import atomic_write
 from ..system.visible import visible
+from .format import Format
 from .names import split_member
 
 HEAD = """\
@@ -55,6 +55,8 @@ def write(material: str | Path, path: str | Path) -> None:
 
 
 def _xml(name: str, path: Path) -> str:
+    from xml.sax.saxutils import quoteattr  # which loads all that opens network connections
+
     # No two hyphens in a comment.
     quoted = [quoteattr(text).replace("--", "-&#45;") for text in (path.name, path.stem)]
     head = HEAD.format(include=quoted[0], id=quoted[1])
@@ -71,9 +73,9 @@ def _json(name: str, path: Path) -> str:
 
 
 def read(path: str | Path) -> dict[str, Any]:
-    """The dictionary in a .json snippet, with the file's place from where `path` is.
+    """The dictionary in a .json snippet, with `filename` resolved against the folder of the snippet.
 
-    Raises FormatError if it is none.
+    Raises FormatError if it is not a snippet.
     """
     path = Path(path)
     try:
@@ -87,3 +89,12 @@ def read(path: str | Path) -> dict[str, Any]:
     if file.is_file():
         snippet["filename"] = str(file) + (f":{member}" if member else "")
     return snippet
+
+
+FORMAT = Format(
+    "Mitsuba snippet",
+    (".xml", ".json"),
+    "a bsdf for a scene (.xml) or for load_dict (.json), which loads the material from its own file",
+    write=write,
+    names_source=True,
+)

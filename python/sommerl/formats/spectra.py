@@ -98,7 +98,7 @@ _RESPONSE = (
 
 
 def srgb_weights(wavelengths: NDArray[Any]) -> NDArray[np.float64]:
-    """The matrix (n, 3) that takes reflectances at so many increasing wavelengths [nm] to linear sRGB.
+    """The matrix (n, 3) that takes reflectances at n increasing wavelengths [nm] to linear sRGB.
 
     Between the wavelengths a spectrum is linear, beyond them constant. A spectrum of ones becomes (1, 1, 1).
     """

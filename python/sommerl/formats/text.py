@@ -16,7 +16,7 @@ LINE_ENDS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"  # of str.splitlines
 
 
 def text_of(path: Path, data: bytes) -> str:
-    """The text in a file's bytes. Raises FormatError if it is not text, or has more lines than anybody measures."""
+    """The text in a file's bytes. Raises FormatError if it is not text, or has more than MOST_LINES lines."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -34,9 +34,10 @@ def uncommented(text: str) -> list[str]:
 def rows(
     path: Path, lines: list[str], columns: int, delimiter: str | None = None, used: list[int] | None = None
 ) -> NDArray[np.float64]:
-    """The numbers in lines of so many columns, (n, columns), or in some of them. Raises FormatError.
+    """The numbers in lines of text, shape (lines, columns). Raises FormatError where a line has other columns.
 
-    delimiter: None for spaces. used: the columns that are wanted; all if None.
+    columns: how many a line has. delimiter: what separates them; None for spaces. used: the numbers of the columns that
+        are wanted, which are then those of the result; None for all.
     """
     if any(len(line.split(delimiter)) != columns for line in (*lines[:1], *lines[-1:])):
         found = next(n for line in (lines[0], lines[-1]) if (n := len(line.split(delimiter))) != columns)

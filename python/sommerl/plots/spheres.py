@@ -23,7 +23,7 @@ def fits(name: str, models: Sequence[str], comparisons: Sequence[Comparison], pa
     with plain_style():
         cells = [(name, [comparisons[0].pictures()[0]])]
         for model, comparison in zip(models, comparisons, strict=True):
-            cells.append((f"{model}: {comparison.metrics.psnr_object_db:.1f} dB", comparison.pictures()[1:]))
+            cells.append((f"{model}: {comparison.metrics['psnr_object_db']:.1f} dB", comparison.pictures()[1:]))
         columns = min(COLUMNS, len(cells))
         lines = -(-len(cells) // columns)
         figure = figures.Figure(figsize=(2.2 * columns, 4.7 * lines), layout="constrained")

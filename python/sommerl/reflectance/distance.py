@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,44 +10,60 @@ from numpy.typing import NDArray
 from .arrays import Triple
 from .cells import Lattice
 from .half_diff import directions
+from .metric import Metric, measured
 
 LOG_FLOOR = 1e-3  # [1/sr]: reflectances well below it count as black in the log error
-
-
 QUADRATURE = Lattice(45, 30, 36)  # of the asymmetry
 
-
-@dataclass(frozen=True)
-class TableMetrics:
-    """Distances between two tables over their cells above the horizon, all channels together.
-
-    rmse: root of the mean squared difference [1/sr].
-    log_error_cosine: root of the mean squared difference of log(f_r + 0.001), each cell weighted by its solid angles
-        times cos θ_i cos θ_o: an error over the hemisphere and not over bins.
-    relative_error: ‖candidate - reference‖ / ‖reference‖ (L2).
-    """
-
-    rmse: float
-    log_error_cosine: float
-    relative_error: float
+Values = NDArray[np.float64]
 
 
-def table_metrics(reference: NDArray[np.float64], candidate: NDArray[np.float64], lattice: Lattice) -> TableMetrics:
-    """Compares f_r of two tables of shape `lattice.shape + (3,)`."""
+def table_metrics(reference: Values, candidate: Values, lattice: Lattice) -> dict[str, float]:
+    """How far apart f_r of two tables is, by the keys of TABLE_METRICS: over their cells above the horizon, all
+    channels together. Both have the shape `lattice.shape + (3,)`."""
+    return measured(TABLE_METRICS, reference, candidate, lattice)
+
+
+def rmse(reference: Values, candidate: Values, lattice: Lattice) -> float:
+    """The root of the mean squared difference [1/sr]."""
+    squared = _squared_difference(reference, candidate, lattice)
+    return float(np.sqrt(squared / (3 * lattice.above_horizon.sum())))
+
+
+def log_error_cosine(reference: Values, candidate: Values, lattice: Lattice) -> float:
+    """The root of the mean squared difference of log(f_r + 0.001), each cell weighted by its solid angles times
+    cos θ_i cos θ_o: an error over the hemisphere and not over bins."""
     above = lattice.above_horizon
     cos_i, cos_o = lattice.cosines()
     weights = np.where(above, lattice.solid_angles() * cos_i * cos_o, 0.0)
-    squared = energy = log_squared = 0.0
+    log_squared = 0.0
     for cells, weight, a, b in zip(above, weights, reference, candidate, strict=True):  # a slice of θ_h at a time
-        squared += float(((b - a)[cells] ** 2).sum())
-        energy += float((a[cells] ** 2).sum())
         log_difference = np.log(np.where(cells[..., None], (b + LOG_FLOOR) / (a + LOG_FLOOR), 1.0))
         log_squared += float((weight[..., None] * log_difference**2).sum())
-    return TableMetrics(
-        rmse=float(np.sqrt(squared / (3 * above.sum()))),
-        log_error_cosine=float(np.sqrt(log_squared / (3 * weights.sum()))),
-        relative_error=float(np.sqrt(squared / energy)),
-    )
+    return float(np.sqrt(log_squared / (3 * weights.sum())))
+
+
+def relative_error(reference: Values, candidate: Values, lattice: Lattice) -> float:
+    """‖candidate − reference‖ / ‖reference‖ (L2)."""
+    squared = _squared_difference(reference, candidate, lattice)
+    return float(np.sqrt(squared / _sum_of_squares(reference, lattice)))
+
+
+def _squared_difference(reference: Values, candidate: Values, lattice: Lattice) -> float:
+    return _sum_of_squares((b - a for a, b in zip(reference, candidate, strict=True)), lattice)
+
+
+def _sum_of_squares(values: Iterable[Values], lattice: Lattice) -> float:
+    """Over the cells above the horizon. values: (θ_d, φ_d, 3) of each slice of θ_h, so that little memory is taken."""
+    return sum(float((part[cells] ** 2).sum()) for cells, part in zip(lattice.above_horizon, values, strict=True))
+
+
+# What `table_metrics` measures. A value takes reference, candidate and lattice.
+TABLE_METRICS: list[Metric] = [
+    Metric("rmse", "table: RMSE [1/sr]", rmse, "{:.3g}".format),
+    Metric("log_error_cosine", "table: log error, cosine-weighted", log_error_cosine, "{:.4f}".format),
+    Metric("relative_error", "table: relative error", relative_error, "{:.3g}".format),
+]
 
 
 def energy_share(part: NDArray[np.float64], whole: NDArray[np.float64], lattice: Lattice) -> float:

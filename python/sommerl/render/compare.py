@@ -13,18 +13,18 @@ from ..reflectance.brdf import Brdf
 from ..sampling.half_vector import HalfVectorSampler
 from .frame import Image
 from .images import difference
-from .metrics import ImageMetrics, exposure, image_metrics, psnr, to_srgb8
+from .metrics import exposure, image_metrics, psnr, to_srgb8
 from .passes import DEFAULT_SIZE, DEFAULT_SPP, Progress, render, render_all
 from .scenes import sphere
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two renderings of one scene, and how much they differ."""
+    """Two renderings of one scene, and how much they differ, by the keys of `metrics.METRICS`."""
 
     reference: Image
     candidate: Image
-    metrics: ImageMetrics
+    metrics: dict[str, float]
 
     @classmethod
     def of(cls, reference: Image, candidate: Image) -> Comparison:

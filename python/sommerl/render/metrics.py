@@ -6,12 +6,14 @@ computed without the rounding to 8 bits, which hides some small differences and 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..reflectance.metric import Metric, decibels, measured
 from ..system.errors import MaterialError
 from ..system.optional import optional
 
@@ -23,39 +25,29 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class ImageMetrics:
-    """Differences between two images at the reference's exposure. PSNRs of identical images are infinite.
+class Exposed:
+    """Two images at the reference's exposure: linear, and in 8 bits on the curve of sRGB. mask: the object's pixels."""
 
-    psnr_object_db, psnr_frame_db: over the object's pixels, and over all pixels; 8-bit sRGB, all three channels.
-    psnr_unrounded_db: over the object's pixels, on the sRGB curve, but not rounded to 8 bits.
-    ssim, delta_e_itp, flip: means over the object's pixels of structural similarity (Wang et al. 2004), of ΔE_ITP
-        (ITU-R BT.2124) on a display of 100 cd/m², and of ꟻLIP (Andersson et al. 2020).
+    reference: Pixels
+    candidate: Pixels
+    reference8: NDArray[np.uint8]
+    candidate8: NDArray[np.uint8]
+    mask: Mask
+
+    @classmethod
+    def of(cls, reference: Pixels, candidate: Pixels, mask: Mask) -> Exposed:
+        """From linear images. Raises MaterialError as `exposure` does."""
+        scale = exposure(reference, mask)
+        a, b = reference * scale, candidate * scale
+        return cls(a, b, to_srgb8(a), to_srgb8(b), mask)
+
+
+def image_metrics(reference: Pixels, candidate: Pixels, mask: Mask) -> dict[str, float]:
+    """How far apart two linear images of shape (height, width, 3) are, by the keys of METRICS.
+
+    mask: (height, width), where the object is. Raises MissingDependencyError without the packages of sommerl[render].
     """
-
-    psnr_object_db: float
-    psnr_frame_db: float
-    psnr_unrounded_db: float
-    ssim: float
-    delta_e_itp: float
-    flip: float
-
-
-def image_metrics(reference: Pixels, candidate: Pixels, mask: Mask) -> ImageMetrics:
-    """Compares two images in linear RGB, (height, width, 3). mask: the pixels that show the object, (height, width).
-
-    Raises MissingDependencyError without the packages of sommerl[render], MaterialError as `exposure` does.
-    """
-    scale = exposure(reference, mask)
-    a, b = to_srgb8(reference * scale), to_srgb8(candidate * scale)
-    unrounded = (to_srgb(image[mask] * scale) for image in (reference, candidate))
-    return ImageMetrics(
-        psnr_object_db=psnr(a[mask], b[mask]),
-        psnr_frame_db=psnr(a, b),
-        psnr_unrounded_db=psnr(*unrounded, peak=1.0),
-        ssim=ssim(a, b, mask),
-        delta_e_itp=delta_e_itp(a, b, mask),
-        flip=flip(a, b, mask),
-    )
+    return measured(METRICS, Exposed.of(reference, candidate, mask))
 
 
 def exposure(reference: Pixels, mask: Mask) -> float:
@@ -123,3 +115,33 @@ def _flip(a: NDArray[np.uint8], b: NDArray[np.uint8], coloured: bool) -> NDArray
     kept = optional("flip_evaluator", "flip-evaluator", "image metrics", "render")
     images = ((image / 255.0).astype(np.float32) for image in (a, b))
     return np.asarray(kept.evaluate(*images, "LDR", applyMagma=coloured, computeMeanError=False)[0])
+
+
+def _psnr_object(pair: Exposed) -> float:
+    return psnr(pair.reference8[pair.mask], pair.candidate8[pair.mask])
+
+
+def _psnr_frame(pair: Exposed) -> float:
+    return psnr(pair.reference8, pair.candidate8)
+
+
+def _psnr_unrounded(pair: Exposed) -> float:
+    return psnr(*(to_srgb(image[pair.mask]) for image in (pair.reference, pair.candidate)), peak=1.0)
+
+
+def _of_8_bits(distance: Callable[[NDArray[np.uint8], NDArray[np.uint8], Mask], float]) -> Callable[[Exposed], float]:
+    """A distance between two images in 8 bits, over a mask, as one between an exposed pair."""
+    return lambda pair: distance(pair.reference8, pair.candidate8, pair.mask)
+
+
+# What `image_metrics` measures. A value takes an Exposed pair. All are over the object's pixels but the frame's PSNR.
+# PSNR: of 8-bit sRGB, three channels together; inf for identical images. SSIM: structural similarity (Wang et al.
+# 2004). ΔE_ITP (ITU-R BT.2124): on a display of PEAK_LUMINANCE. FLIP: ꟻLIP (Andersson et al. 2020).
+METRICS: list[Metric] = [
+    Metric("psnr_object_db", "PSNR, object", _psnr_object, decibels),
+    Metric("psnr_frame_db", "PSNR, frame", _psnr_frame, decibels),
+    Metric("psnr_unrounded_db", "PSNR, object, not rounded to 8 bits", _psnr_unrounded, decibels),
+    Metric("ssim", "SSIM", _of_8_bits(ssim), "{:.4f}".format),
+    Metric("delta_e_itp", "ΔE_ITP", _of_8_bits(delta_e_itp), "{:.2f}".format),
+    Metric("flip", "FLIP", _of_8_bits(flip), "{:.4f}".format),
+]

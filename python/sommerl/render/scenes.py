@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -13,9 +12,7 @@ from numpy.typing import NDArray
 
 from ..reflectance.brdf import Brdf
 from ..sampling.sampler import Sampler
-from ..system.errors import OptionError
 from .bsdf import make_bsdf
-from .environment import default_environment
 from .frame import Scene
 from .llvm import mitsuba
 from .meshes import Mesh, knot, lathe
@@ -90,55 +87,6 @@ def still_life(brdfs: Sequence[Brdf], *, samplers: Sequence[Sampler] | None = No
         "front": _light((1.6, 2.4, 3.6), (0, 0.4, 0), (0.5, 0.5), (5.0, 5.0, 5.0)),
     }
     return _scene(things, tuple(objects), (0.0, 1.75, 4.6), (0.04, 0.4, 0.0), 25.5, size=size, bounces=BOUNCES)
-
-
-@dataclass(frozen=True)
-class Stage:
-    """What a scene takes.
-
-    materials: the built-in ones that are shown if no others are given: their number is that of the scene's.
-    """
-
-    materials: tuple[str, ...]
-    environment: bool = True
-    mesh: bool = False
-
-
-STAGES: Mapping[str, Stage] = {
-    "sphere": Stage(("blue-metallic-paint",)),
-    "statue": Stage(("blue-metallic-paint",), mesh=True),
-    "still-life": Stage(("nickel", "yellow-matte-plastic", "blue-metallic-paint"), environment=False),
-}
-
-
-def stage(
-    name: str,
-    brdfs: Sequence[Brdf],
-    *,
-    samplers: Sequence[Sampler] | None = None,
-    environment: NDArray[np.float32] | None = None,
-    mesh: Mesh | None = None,
-    size: int = DEFAULT_SIZE,
-) -> Scene:
-    """A scene by its name, with as many materials as it takes, see `STAGES`.
-
-    environment, mesh: the scene's own if None. Raises OptionError for what the scene does not take.
-    """
-    if name not in STAGES:
-        raise OptionError(f"scene: expected {', '.join(STAGES)}, found {name}")
-    taken = STAGES[name]
-    if len(brdfs) != len(taken.materials):
-        raise OptionError(f"{name}: expected {len(taken.materials)} materials, found {len(brdfs)}")
-    for what, given, allowed in (("environment", environment, taken.environment), ("mesh", mesh, taken.mesh)):
-        if given is not None and not allowed:
-            raise OptionError(f"{name}: expected no {what}, since it has its own, found one")
-    if name == "still-life":
-        return still_life(brdfs, samplers=samplers, size=size)
-    light = default_environment() if environment is None else environment
-    sampler = samplers[0] if samplers else None
-    if name == "statue":
-        return statue(brdfs[0], light, mesh=mesh, sampler=sampler, size=size)
-    return sphere(brdfs[0], light, sampler=sampler, size=size)
 
 
 @cache

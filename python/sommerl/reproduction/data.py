@@ -10,7 +10,8 @@ from typing import Any
 from ..compression.material import SomManBrdf
 from ..compression.paper.options import TrainOptions
 from ..compression.paper.train import train
-from ..formats.load import EXTENSIONS, load_table
+from ..formats.load import load_table
+from ..formats.registry import extensions, readable
 from ..reflectance.table import BrdfTable
 from ..system.errors import FormatError
 
@@ -32,9 +33,10 @@ def material(data: Path | None, name: str) -> BrdfTable:
     elif data.is_file():
         source = f"{data}:{name}"
     else:
-        found = [path for extension in EXTENSIONS if (path := data / f"{name}{extension}").is_file()]
+        known = extensions(readable())
+        found = [path for extension in known if (path := data / f"{name}{extension}").is_file()]
         if not found:
-            raise FormatError(f"{data}: there is no file {name} in it that ends in one of {', '.join(EXTENSIONS)}")
+            raise FormatError(f"{data}: there is no file {name} in it that ends in one of {', '.join(known)}")
         source = str(found[0])
     return load_table(source)
 

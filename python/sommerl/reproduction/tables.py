@@ -78,7 +78,7 @@ def figure5(
     }
     comparisons = _compared(table, [(name, candidates[name]) for name in printed], picture, _part(progress, 1, 2))
     return [
-        ImageRow(name, found.metrics.psnr_frame_db, found.metrics.psnr_object_db, printed[name])
+        ImageRow(name, found.metrics["psnr_frame_db"], found.metrics["psnr_object_db"], printed[name])
         for name, found in zip(printed, comparisons, strict=True)
     ]
 

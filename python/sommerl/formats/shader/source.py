@@ -1,7 +1,8 @@
 """Materials as source code: a C++ header, GLSL or HLSL, with palette, packed indices, a sampler's table, and the
 functions `eval`, `sample` and `pdf`.
 
-One text serves the three languages; they differ in a few lines before it and in how an array is written.
+One text serves the three languages; they differ in a few lines before and after it and in how an array is written
+(`language.py`). The text is in the folder `templates`, where @WORDS@ stand for what differs between materials.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import re
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -24,10 +26,8 @@ from ...sampling import half_vector
 from ...system.errors import FormatError
 from ...system.files import atomic_write
 from ...system.visible import visible
-from . import text
-from .text import CPP, GLSL, HLSL, Language
+from .language import LANGUAGES, Language
 
-LANGUAGES = {".h": CPP, ".hpp": CPP, ".glsl": GLSL, ".hlsl": HLSL}
 A_LINE = 10  # numbers
 LONGEST_TITLE = 300
 OF_SAMPLER = ("ROWS", "COLUMNS", "ELEVATIONS", "CELLS", "SLOTS", "SLOT_BITS", "WHOLE", "TINY", "LOWEST", "SMALLEST")
@@ -35,7 +35,7 @@ OF_SAMPLER = ("ROWS", "COLUMNS", "ELEVATIONS", "CELLS", "SLOTS", "SLOT_BITS", "W
 
 @dataclass(frozen=True)
 class _Array:
-    """An array of constants. macro: what reads it. kind: uint or real."""
+    """An array of constants. macro: through which the functions read it. kind: uint or real."""
 
     macro: str
     name: str
@@ -45,7 +45,11 @@ class _Array:
 
 @dataclass(frozen=True)
 class _Parts:
-    """What one kind of material puts into the text. values: of the words between @."""
+    """What the text holds for one kind of lattice, cells or nodes.
+
+    contents, functions, fold, lookup: filled-in templates; see `contents_…`, `cells`, `nodes`, `fold_…`, `lookup_…`.
+    values: what stands for the words between @.
+    """
 
     contents: str
     arrays: list[_Array]
@@ -66,20 +70,26 @@ def write(material: Brdf, path: str | Path) -> None:
 
 
 def identifier(name: str) -> str:
-    """A name that all three languages take; if letters had to go, with a number in their place."""
+    """A name that all three languages take: "material_", then the ASCII letters and digits of `name`.
+
+    A checksum of `name` follows where it is not ASCII, so that names in other scripts stay different.
+    """
     plain = re.sub(r"[^0-9A-Za-z]+", "_", name).strip("_")
     lost = "" if name.isascii() else f"{zlib.crc32(name.encode('utf-8', 'surrogatepass')):08x}"
     return "_".join(part for part in ("material", plain, lost) if part)
 
 
 def comment(text: str) -> str:
-    """A text that a comment ends after, and not in: no line's end, nothing that joins lines (also as C once wrote it,
-    "??/"), and no end of a comment of another kind."""
+    """A text that is safe within a comment of one line: without line breaks, without backslashes and C's trigraphs
+    ("??/" was one for a backslash), which would join the next line to it, and without "*/"."""
     return re.sub(r"\s+", " ", re.sub(r"\\|\?(?=\?)|\*(?=/)", " ", visible(text, LONGEST_TITLE)))
 
 
 def source(material: Brdf, language: Language, name: str) -> str:
-    """The source code. name: of the namespace in C++, and before the names of functions in the others."""
+    """The source code of a compressed material. name: of the namespace in C++; the prefix of all functions elsewhere.
+
+    Raises FormatError for a material that is not compressed.
+    """
     if not isinstance(material, SomManBrdf):
         raise FormatError(f"{material.name}: expected a compressed material, with a palette, found a {material.kind}")
     buffers, lut = material.buffers(), material.lut
@@ -90,23 +100,37 @@ def source(material: Brdf, language: Language, name: str) -> str:
     table = half_vector.HalfVectorSampler.fitted(material).table
     arrays = [*parts.arrays, _words("SOMMERL_SAMPLER", "sampler", table.reshape(-1))]
     macros = [array.macro for array in arrays]
-    evaluation = text.EVAL.replace("@FOLD@", parts.fold).replace("@LOOKUP@", parts.lookup)
-    functions = text.ENTRY + parts.functions + evaluation + text.SAMPLING
+    blocks = [
+        _template("head", CONTENTS=parts.contents),
+        _template(f"{language.name}_begin"),
+        *(_guarded(array, language) for array in arrays),
+        _template("entry"),
+        parts.functions,
+        _template("eval", FOLD=parts.fold, LOOKUP=parts.lookup),
+        _template("sampling"),
+    ]
     for_the_next_file = ("SOMMERL_FUNCTION", "SOMMERL_OUT", *macros)
     undefined = "".join(f"#undef {macro}\n" for macro in for_the_next_file)
-    whole = text.HEAD.replace("@CONTENTS@", parts.contents) + language.before + "\n"
-    whole += "\n".join(_guarded(array, language) for array in arrays) + functions + language.after + undefined
+    whole = "\n".join(blocks) + _template(f"{language.name}_end") + undefined
     values = parts.values | {constant: repr(getattr(half_vector, constant)) for constant in OF_SAMPLER}
     values |= {
         "TITLE": comment(material.name),
         "SHA": comment(material.source.sha256) or "unknown",
         "NAME": name,
-        "CALL": f"{name}::" if language is CPP else f"{name}_",
+        "CALL": f"{name}{language.qualifier}",
         "MACROS": " and ".join((", ".join(f"{macro}(i)" for macro in macros[:-1]), f"{macros[-1]}(i)")),
         "SHARE_THETA": repr(2 / np.pi),
     }
     # In one pass, so that a name with such a mark in it stays what it is.
     return re.sub(r"@([A-Z_]+)@", lambda mark: values.get(mark[1], mark[0]), whole)
+
+
+def _template(name: str, **parts: str) -> str:
+    """A template, with a text in place of each line that is nothing but @PART@."""
+    text = resources.files("sommerl.formats.shader").joinpath("templates", f"{name}.template").read_text("utf-8")
+    for part, inserted in parts.items():
+        text = text.replace(f"@{part}@\n", inserted)
+    return text
 
 
 def _cells(lattice: Lattice, interpolation: str, index: NDArray[Any], lut: NDArray[np.float64]) -> _Parts:
@@ -121,11 +145,11 @@ def _cells(lattice: Lattice, interpolation: str, index: NDArray[Any], lut: NDArr
         "SHARE_PHI": repr(1 / lattice.phi_d_range),
     }
     return _Parts(
-        contents=text.CELLS_CONTENTS,
+        contents=_template("contents_cells"),
         arrays=[words, _reals("SOMMERL_LUT", "palette", lut)],
-        functions=text.CELLS,
-        fold=text.RECIPROCAL if lattice.reciprocal else text.NOT_RECIPROCAL,
-        lookup=text.NEAREST if interpolation == "nearest" else text.TRILINEAR,
+        functions=_template("cells"),
+        fold=_template("fold_reciprocal" if lattice.reciprocal else "fold_not_reciprocal"),
+        lookup=_template(f"lookup_{interpolation}", BINS=_template("bins")),
         values=values,
     )
 
@@ -154,17 +178,20 @@ def _nodes(buffers: Mapping[str, NDArray[Any]], lut: NDArray[np.float64]) -> _Pa
     }
     reals = [_reals("SOMMERL_LUT", "palette", lut), _reals("SOMMERL_GAIN", "gains", gains)]
     return _Parts(
-        contents=text.NODES_CONTENTS,
+        contents=_template("contents_nodes"),
         arrays=[words, *reals, _words("SOMMERL_LATTICE", "lattice", lattice)],
-        functions=text.NODES,
-        fold=text.RECIPROCAL,
-        lookup=text.NODES_LOOKUP,
+        functions=_template("nodes"),
+        fold=_template("fold_reciprocal"),
+        lookup=_template("lookup_nodes"),
         values=values,
     )
 
 
 def _lattice(buffers: Mapping[str, NDArray[Any]]) -> NDArray[np.uint32]:
-    """The words that `shader_text.NODES` tells of, from what `NodeLattice.buffers` says."""
+    """Where the nodes are, as the words of SOMMERL_LATTICE, whose order the template `nodes` describes.
+
+    buffers: those of `NodeLattice.buffers`.
+    """
     counts = buffers["phi_d_count"].astype(np.uint32)
     bands, none = len(counts), np.zeros_like(counts)
     theta_h = _steps(buffers["row_below"], buffers["row_place"], none[:1])
@@ -177,7 +204,13 @@ def _lattice(buffers: Mapping[str, NDArray[Any]]) -> NDArray[np.uint32]:
 
 
 def _steps(below: NDArray[Any], places: NDArray[Any], turns: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """The words (axes, FINE) of axes' steps. turns: the number that is that of the first node again; 0 if none is."""
+    """One word for each step of the fine grid, shape (axes, FINE): between which nodes of its axis the step lies.
+
+    From the lowest byte: the node at or below the step, the node after that, and the places of the two.
+    below: (axes × FINE), for each step, the number of the node at or below it. places: (axes × nodes), for each node,
+        its place on the fine grid. turns: (axes,), the number of nodes of an axis that is periodic, on which the node
+        after the last one is the first; 0 for an axis that ends.
+    """
     axes = len(turns)
     below = below.astype(np.uint32).reshape(axes, FINE)
     places = places.astype(np.uint32).reshape(axes, -1)
@@ -189,7 +222,7 @@ def _steps(below: NDArray[Any], places: NDArray[Any], turns: NDArray[np.uint32])
 
 
 def _packed(index: NDArray[Any]) -> tuple[_Array, dict[str, str]]:
-    """All indices in words of 32 bits, the first in the lowest bits, and what the text says of them."""
+    """All indices in words of 32 bits, the first in the lowest bits; and the values of the template `entry`."""
     flat, bits = index.reshape(-1), 8 * index.dtype.itemsize
     padded = np.append(flat, np.zeros(-len(flat) % (32 // bits), flat.dtype))
     words = padded.astype(padded.dtype.newbyteorder("<")).view("<u4")
@@ -209,7 +242,7 @@ def _reals(macro: str, name: str, values: NDArray[np.float64]) -> _Array:
 
 
 def _guarded(array: _Array, language: Language) -> str:
-    """The array, unless there is a macro to read it elsewhere."""
+    """The declaration of an array and of the macro that reads it, left out where the user has defined that macro."""
     size, name = len(array.values), f"@NAME@_{array.name}"
     lines = ("    " + ", ".join(array.values[i : i + A_LINE]) for i in range(0, size, A_LINE))
     constants = language.array.format(type=array.kind, name=name, size=size, values=",\n".join(lines))

@@ -1,5 +1,8 @@
 """The scenes by name: what they take, what their masks show, and that they repeat."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from helpers import lambertian_table, must_fail
@@ -9,25 +12,27 @@ from sommerl.render.environment import default_environment
 from sommerl.render.llvm import mitsuba
 from sommerl.render.meshes import knot
 from sommerl.render.passes import render
-from sommerl.render.scenes import STAGES, stage
+from sommerl.render.scene_registry import SCENES, make_scene
 from sommerl.sampling.cosine import CosineSampler
 from sommerl.system.errors import OptionError
 
 mi = mitsuba()
+DOCS = Path(__file__).parents[2] / "docs" / "scenes.md"
 
 
 def materials(name):
-    return [builtin(material) for material in STAGES[name].materials]
+    """As many as a picture has, of those that are the scene's own."""
+    return [builtin(material) for material in SCENES[name].materials[: SCENES[name].places]]
 
 
 def check_same(name, spp, seed=3, other=3):
     """Not all numbers of samples give the same sums in one pass of Mitsuba's."""
-    scene = stage(name, materials(name), size=40)
+    scene = make_scene(name, materials(name), size=40)
     first, again = render(scene, spp=spp, seed=seed).pixels, render(scene, spp=spp, seed=other).pixels
     assert np.array_equal(first, again)
 
 
-@pytest.mark.parametrize("name", STAGES)
+@pytest.mark.parametrize("name", SCENES)
 def test_same_seed_same_pixels(name):
     for _ in range(3):
         check_same(name, 37)
@@ -36,7 +41,7 @@ def test_same_seed_same_pixels(name):
 
 def test_shapes_and_lamps_come_in_the_order_of_the_description():
     """Mitsuba draws lamps by their number: in another order, the same seed would give another image."""
-    scene = stage("still-life", [lambertian_table()] * 3, size=8)
+    scene = make_scene("still-life", [lambertian_table()] * 3, size=8)
     shapes = [shape.id() for shape in scene.mitsuba.shapes()]
     assert shapes == [*scene.objects, "table", "key", "rim", "front"]
     lamps = [emitter.get_shape() for emitter in scene.mitsuba.emitters()]
@@ -46,7 +51,7 @@ def test_shapes_and_lamps_come_in_the_order_of_the_description():
 def test_the_objects_are_what_carries_the_materials():
     """With black materials, the mask is what no light comes from."""
     for name in ("statue", "still-life"):
-        scene = stage(name, [lambertian_table(1e-9)] * len(STAGES[name].materials), size=96)
+        scene = make_scene(name, [lambertian_table(1e-9)] * SCENES[name].places, size=96)
         image = render(scene, spp=16)
         assert image.pixels[image.mask].mean() < 0.05 * image.pixels[~image.mask].mean()
         black = image.pixels.max(axis=-1) < 1e-7
@@ -57,7 +62,7 @@ def test_the_objects_are_what_carries_the_materials():
 
 def check_no_holes(brdf):
     """Hardly any pixel of the statue is black: its front is outside, and its smooth normals face the camera."""
-    image = render(stage("statue", [brdf], environment=np.ones((8, 16, 3), np.float32), size=128), spp=64)
+    image = render(make_scene("statue", [brdf], environment=np.ones((8, 16, 3), np.float32), size=128), spp=64)
     assert (image.pixels[image.mask].max(axis=-1) < 0.02).mean() < 1e-3
 
 
@@ -67,8 +72,8 @@ def test_the_statue_has_no_holes():
 
 
 def test_a_mesh_stands_on_the_plane_at_unit_height():
-    whole = stage("statue", materials("statue"), size=64)
-    other = stage("statue", materials("statue"), mesh=knot("any name").moved(5, 5, 5), size=64)
+    whole = make_scene("statue", materials("statue"), size=64)
+    other = make_scene("statue", materials("statue"), mesh=knot("any name").moved(5, 5, 5), size=64)
     rows = [np.flatnonzero(render(scene, spp=1).mask.any(axis=1))[[0, -1]] for scene in (whole, other)]
     assert np.abs(rows[0] - rows[1]).max() <= 3
 
@@ -77,7 +82,7 @@ def test_the_same_directions_for_all_materials():
     """A brighter material gives a brighter image and no other noise: no path ends by what it carries."""
     environment = default_environment(32)
     grey, dark = (
-        render(stage("statue", [lambertian_table(albedo)], environment=environment, size=32), spp=4)
+        render(make_scene("statue", [lambertian_table(albedo)], environment=environment, size=32), spp=4)
         for albedo in (0.4, 0.2)
     )
     inside = np.logical_and.reduce([np.roll(grey.mask, (y, x), (0, 1)) for y in (-1, 0, 1) for x in (-1, 0, 1)])
@@ -86,41 +91,56 @@ def test_the_same_directions_for_all_materials():
     assert ratio.max() > 2.05
 
 
+def check_docs(markdown):
+    rows = re.findall(r"^\| `([a-z-]+)` \|", markdown[: markdown.index("\n\n    ")], re.MULTILINE)
+    assert rows == list(SCENES)
+
+
+def test_docs_have_a_row_for_each_scene():
+    markdown = DOCS.read_text("utf-8")
+    check_docs(markdown)
+    must_fail(check_docs, markdown.replace("| `grid` |", "| `cube` |"))
+
+
 def test_scenes_refuse_what_they_do_not_take():
     with pytest.raises(OptionError, match="still-life: expected 3 materials, found 1"):
-        stage("still-life", materials("statue"))
+        make_scene("still-life", materials("statue"))
     with pytest.raises(OptionError, match="expected no environment"):
-        stage("still-life", materials("still-life"), environment=default_environment(16))
+        make_scene("still-life", materials("still-life"), environment=default_environment(16))
     with pytest.raises(OptionError, match="sphere: expected no mesh"):
-        stage("sphere", materials("sphere"), mesh=knot("knot"))
-    with pytest.raises(OptionError, match="scene: expected sphere, statue, still-life, found grid"):
-        stage("grid", [])
+        make_scene("sphere", materials("sphere"), mesh=knot("knot"))
+    with pytest.raises(OptionError, match="grid: expected 1 material, found 0"):
+        make_scene("grid", [])
+    with pytest.raises(OptionError, match="scene: expected sphere, statue, still-life, grid, found cube"):
+        make_scene("cube", [])
 
 
-@pytest.mark.parametrize("name", STAGES)
+@pytest.mark.parametrize("name", SCENES)
 def test_samplers_are_the_ones_that_are_given(name):
     """Cosine sampling is the same for all materials, and other than the default."""
     brdfs = materials(name)
     one, other = (
-        render(stage(name, brdfs, samplers=[CosineSampler.fitted(brdf) for brdf in fitted_to], size=24), spp=4).pixels
+        render(
+            make_scene(name, brdfs, samplers=[CosineSampler.fitted(brdf) for brdf in fitted_to], size=24), spp=4
+        ).pixels
         for fitted_to in (brdfs, brdfs[::-1])
     )
     assert np.array_equal(one, other)
-    assert not np.array_equal(one, render(stage(name, brdfs, size=24), spp=4).pixels)
+    assert not np.array_equal(one, render(make_scene(name, brdfs, size=24), spp=4).pixels)
 
 
 def check_as_bright(name, albedo):
     """As Mitsuba's own diffuse material, whose code has nothing in common with ours."""
     own = mi.load_dict({"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.5}})
     images = [
-        render(stage(name, [brdf] * len(STAGES[name].materials), size=48), spp=256)
+        render(make_scene(name, [brdf] * SCENES[name].places, size=48), spp=256)
         for brdf in (lambertian_table(albedo), own)
     ]
     a, b = (image.pixels[image.mask].mean() for image in images)
     assert a == pytest.approx(b, rel=5e-3)
 
 
-@pytest.mark.parametrize("name", STAGES)
+@pytest.mark.parametrize("name", SCENES)
 def test_a_lambertian_is_mitsubas_diffuse(name):
     check_as_bright(name, 0.5)
     must_fail(check_as_bright, name, 0.51)

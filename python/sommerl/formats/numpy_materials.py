@@ -1,0 +1,42 @@
+"""NumPy's files as materials: samples or neural BRDFs, whichever their arrays are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..reflectance.brdf import Brdf
+from ..system.errors import FormatError
+from . import nbrdf, numpy_files, samples
+from .format import Format
+
+
+def _array(path: Path, data: bytes) -> Brdf:
+    if not numpy_files.is_array(data):
+        raise FormatError(f"{path}: expected a NumPy array, found another kind of file")
+    array = numpy_files.read_npy(path, data)
+    sampled = bool(array.dtype.names) or (array.ndim == 2 and array.shape[1] == len(samples.COLUMNS))
+    return samples.parse(path, data) if sampled else nbrdf.parse(path, data)
+
+
+def _archive(path: Path, data: bytes, member: str) -> Brdf:
+    sampled = samples.are_columns(numpy_files.read_npz(path, data))
+    return samples.parse(path, data) if sampled else nbrdf.parse(path, data, member)
+
+
+ARRAY = Format(
+    "NumPy array",
+    (".npy",),
+    "samples, or the weights of a neural BRDF",
+    sniff=numpy_files.is_array,
+    read=_array,
+    largest=numpy_files.LARGEST_FILE,
+)
+ARCHIVE = Format(
+    "NumPy archive",
+    (".npz",),
+    "samples, or neural BRDFs, of which FILE.npz:NAME is one",
+    sniff=numpy_files.is_archive,
+    read=_archive,
+    largest=numpy_files.LARGEST_FILE,
+    members=True,
+)
