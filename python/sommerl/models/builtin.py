@@ -7,13 +7,12 @@ appear.
 
 from __future__ import annotations
 
-import difflib
-
 import numpy as np
 
 from ..reflectance.cells import MERL, Lattice
 from ..reflectance.table import BrdfTable
 from ..system.errors import MaterialError
+from ..system.near import did_you_mean
 from .sgd import PARAMETERS, ShiftedGamma
 
 NAMES = (
@@ -31,10 +30,10 @@ NAMES = (
 
 
 def builtin(name: str) -> ShiftedGamma:
-    """The formula of a built-in material. Raises MaterialError, with the nearest name, if there is none."""
+    """The formula of a built-in material. Raises MaterialError, which names a near one or all, for another name."""
     if name not in _FITS:
-        nearest = difflib.get_close_matches(name, NAMES, 1, 0.0)[0]
-        raise MaterialError(f"{name}: expected a file or a built-in material, found neither; did you mean {nearest}?")
+        hint = did_you_mean(name, NAMES) or f"; built-in are {', '.join(NAMES)}"
+        raise MaterialError(f"{name}: expected a file or a built-in material, found neither{hint}")
     return ShiftedGamma(f"{name} (SGD stand-in)", dict(zip(PARAMETERS, _FITS[name], strict=True)))
 
 
