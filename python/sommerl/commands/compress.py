@@ -43,8 +43,8 @@ class CompressArguments(WritingArguments):
     inputs: tuple[Material, ...] = positional(
         "IN", help="a material: a file, a built-in name, a folder of materials, or a pattern in quotes"
     )
-    output: str = option(
-        "-o", metavar="OUT", help="a .smrl file; for several inputs a folder, which is made if there is none"
+    output: Path = option(
+        "-o", metavar="OUT", help="a .smrl file; or, for any number of inputs, a folder, which is made if there is none"
     )
     preset: Preset | None = option(
         default=None,
@@ -146,14 +146,14 @@ def _method(options: CompressArguments) -> CompactOptions | TrainOptions:
 
 
 def _outputs(options: CompressArguments, sources: Sequence[str]) -> list[Path]:
-    """Where each material goes: into a folder, if there are several, or the output is one or ends as one does."""
-    output = Path(options.output)
+    """Where each material goes: into a folder if there are several, or if the output is one or has no extension."""
+    output = options.output
     several = len(sources) > 1 or any(is_several(source) for source in options.inputs)
     if output.suffix.lower() == ".smrl" and not output.is_dir():
         if len(sources) > 1:
             raise OptionError(f"{output}: expected a folder for {len(sources)} inputs, found the name of a file")
         outputs = [output]
-    elif several or output.is_dir() or options.output.endswith("/"):
+    elif several or output.is_dir() or not output.suffix:
         make_folder(output)
         outputs = [output / f"{stem(source)}.smrl" for source in sources]
     else:
