@@ -38,7 +38,7 @@ def completion(options: CompletionArguments) -> dict[str, Any]:
         for action in made.actions():
             if action.type in (Path, Material):
                 action.complete = shtab.FILE  # pyright: ignore[reportAttributeAccessIssue]
-    script = shtab.complete(commands, options.shell)
+    script = shtab.complete(commands, options.shell).rstrip("\n")
     if not options.json:
         print(script)
     return {"shell": options.shell, "script": script}

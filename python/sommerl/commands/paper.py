@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from itertools import chain
 from pathlib import Path
@@ -20,27 +20,13 @@ from .folders import make_folder
 from .parser import add_command
 
 DEFAULTS = FitOptions()
-Rows = Sequence[tables.FitRow] | Sequence[tables.ImageRow]
 
 
-def _table1(data: Path | None, options: FitOptions, picture: Path, progress: tables.Progress | None) -> Rows:
-    return tables.table1(data, options, progress=progress)
-
-
-def _figure5(data: Path | None, options: FitOptions, picture: Path, progress: tables.Progress | None) -> Rows:
-    return tables.figure5(data, picture, options, progress=progress)
-
-
-def _figure6(data: Path | None, options: FitOptions, picture: Path, progress: tables.Progress | None) -> Rows:
-    return tables.figure6(data, picture, options, progress=progress)
-
-
-ITEMS: dict[str, tuple[str, Callable[[Path | None, FitOptions, Path, tables.Progress | None], Rows]]] = {
-    "table1": ("Table 1: errors of two-lobe fits", _table1),
-    "fig5": ("Fig. 5: blue-metallic-paint on a sphere", _figure5),
-    "fig6": ("Fig. 6: errors of three-lobe fits to green-metallic-paint", _figure6),
+TITLES = {
+    "table1": "Table 1: errors of two-lobe fits",
+    "fig5": "Fig. 5: blue-metallic-paint on a sphere",
+    "fig6": "Fig. 6: errors of three-lobe fits to green-metallic-paint",
 }
-
 DRAWN = ("fig5", "fig6")  # items with a picture beside their table
 
 HEADINGS = {
@@ -59,7 +45,7 @@ HEADINGS = {
 class PaperArguments(WritingArguments):
     """What `paper` is asked for."""
 
-    item: str = positional("ITEM", default="all", choices=[*ITEMS, "all"], help="one of those below (%(default)s)")
+    item: str = positional("ITEM", default="all", choices=[*TITLES, "all"], help="one of those below (%(default)s)")
     data: Path | None = option(
         default=None,
         metavar="DIR",
@@ -77,7 +63,7 @@ def arguments(add: Any) -> None:
     """Adds the command to the command line."""
     summary = "Makes the paper's tables and figures again, beside the figures that it prints."
     example = "sommerl paper table1 --data MERL -o paper"
-    items = "\n".join(f"  {name:8}{title}" for name, (title, _) in ITEMS.items())
+    items = "\n".join(f"  {name:8}{title}" for name, title in TITLES.items())
     add_command(add, "paper", paper, PaperArguments, summary, example, explained=[f"Items:\n{items}"])
 
 
@@ -91,14 +77,14 @@ def paper(options: PaperArguments) -> dict[str, Any]:
     result: dict[str, Any] = {"input": str(options.data) if options.data else None, "output": []}
     files = {
         item: [options.out / f"{item}.{extension}" for extension in ("csv", "png")[: 2 if item in DRAWN else 1]]
-        for item in (ITEMS if options.item == "all" else [options.item])
+        for item in (TITLES if options.item == "all" else [options.item])
     }
     for path in chain(*files.values()):
         check_writable(path)
     for item, written in files.items():
-        title, make = ITEMS[item]
+        title = TITLES[item]
         with console.progress(title) as advance:
-            rows = [asdict(row) for row in make(options.data, chosen, written[-1], advance)]
+            rows = [asdict(row) for row in _made(item, options.data, chosen, written[-1], advance)]
         _write(written[0], rows)
         result[item] = rows
         result["output"] += map(str, written)
@@ -106,6 +92,17 @@ def paper(options: PaperArguments) -> dict[str, Any]:
             _show(title, rows)
             console.say("→ " + ", ".join(map(str, written)), "")
     return result
+
+
+def _made(
+    item: str, data: Path | None, options: FitOptions, picture: Path, progress: tables.Progress | None
+) -> Sequence[tables.FitRow] | Sequence[tables.ImageRow]:
+    """The rows of an item; its picture, if it has one, is written."""
+    if item == "table1":
+        return tables.table1(data, options, progress=progress)
+    if item == "fig5":
+        return tables.figure5(data, picture, options, progress=progress)
+    return tables.figure6(data, picture, options, progress=progress)
 
 
 def _show(title: str, rows: Sequence[dict[str, Any]]) -> None:
