@@ -239,7 +239,7 @@ def test_bad_files_are_refused_by_every_command(capsys, tmp_path, command, name)
     [
         (["info", "blue-metalic-paint"], 1, "did you mean blue-metallic-paint"),
         (["info", "{}/none.smrl"], 1, "none.smrl: expected a file, found none"),
-        (["info", "{}"], 1, "found a directory"),
+        (["info", "{}"], 1, "expected a folder with materials, found none in it"),
         (["compress", "nickle", "-o", "{}/no/folder/x.smrl"], 1, "did you mean nickel"),
         (["compress", "nickel", "-o", "/dev/null/x.smrl"], 1, "/dev/null: expected a folder, found something else"),
         (["compress", "nickel", "-o", "{}/x.binary"], 2, "expected a name that ends in .smrl, found '.binary'"),

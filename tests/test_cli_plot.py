@@ -47,7 +47,7 @@ def test_materials_of_one_name_are_told_apart(capsys, smrl, tmp_path):
         capsys, "plot", "pearl-paint", smrl, copy, "nickel", "-o", tmp_path / "x.png", "--kind", "theta-h"
     )
     name = "pearl-paint (SGD stand-in)"
-    others = [f"pearl.smrl: {name}", f"{copy}: {name}"]
+    others = [f"{smrl}: {name}", f"{copy}: {name}"]
     assert [each["label"] for each in result["materials"]] == [name, *others, "nickel (SGD stand-in)"]
     assert [each["name"] for each in result["materials"]] == [*[name] * 3, "nickel (SGD stand-in)"]
 
