@@ -80,8 +80,9 @@ def test_a_folder_of_a_built_in_name_is_not_it(folder, monkeypatch):
     [
         ("{}/*.binary", "{}/*.binary: expected names of files that match, found none"),
         ("{}/empty", "{}/empty: expected a folder with materials, found none in it"),
-        ("{}/bro*", "{}/broken.smrl: expected"),
-        ("{}/bro*2", "{}/bro*2: expected materials, found none that can be read"),
+        ("{}/broken.smrl", "{}/broken.smrl: expected"),
+        ("{}/broken*", "{}/broken*: expected materials, found none that can be read"),
+        ("{}/b*.2", "{}/b*.2: expected materials, found none that can be read"),
     ],
 )
 def test_nothing_to_compress(capsys, folder, tmp_path, given, sentence):
@@ -96,12 +97,17 @@ def test_nothing_to_compress(capsys, folder, tmp_path, given, sentence):
 
 
 def test_info_of_several_is_a_table(capsys, folder):
-    found = run(capsys, "info", folder / "a.smrl", "nickel", folder / "b.smrl")
+    found = run(capsys, "info", folder / "a.smrl", "nickel", folder / "b.smrl", folder / "below" / "c.smrl")
     assert (found[0], found[2]) == (0, "")
     head, *rows = [line for line in found[1].splitlines() if "│" in line or "┃" in line]
-    assert "palette" in head
-    assert "coverage" not in head
-    assert "8 × 8 × 12" in "".join(rows)
+    assert head.replace("┃", "").split() == ["material", "kind", "lattice", "palette", "lookup", "memory", "disk"]
+    assert [row.replace("│", "").split()[:2] for row in rows] == [
+        ["a.smrl", "paper"],
+        ["nickel", "model"],
+        ["b.smrl", "paper"],
+        ["c.smrl", "paper"],
+    ]
+    assert "8 × 8 × 12" in rows[0]
     listed = run_json(capsys, "info", folder / "a.smrl", "nickel")["materials"]
     assert [each["kind"] for each in listed] == ["som-man", "model"]
 

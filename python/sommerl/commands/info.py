@@ -19,14 +19,12 @@ from .rows import UNKNOWN, fact_rows, origin_rows, text
 HIDDEN = ("facts", "input", "lobes", "made_from", "measured_against")  # keys that people see in rows of their own
 SIZES = ("bytes_paper", "bytes_memory", "bytes_disk")
 COLUMNS = {
-    "input": "material",
     "kind": "kind",
-    "preset": "preset",
     "lattice": "lattice",
     "clusters": "palette",
     "interpolation": "lookup",
-    "bytes_memory": "in memory",
-    "bytes_disk": "on disk",
+    "bytes_memory": "memory",
+    "bytes_disk": "disk",
 }
 
 
@@ -77,8 +75,15 @@ def _rows(known: Mapping[str, Any], brdf: Brdf) -> dict[str, str]:
 def _print_table(found: Sequence[Mapping[str, Any]]) -> None:
     """A row for each of several materials, with those columns that say something."""
     keys = [key for key in COLUMNS if any(each[key] is not None for each in found)]
-    rows = [[_cell(key, each[key]) for key in keys] for each in found]
-    console.print_table(f"{len(found)} materials", [COLUMNS[key] for key in keys], rows)
+    files = [Path(each["input"]).name for each in found]
+    rows = [
+        [
+            file if files.count(file) == 1 else each["input"],
+            *(_cell(key, each["preset"] or each[key] if key == "kind" else each[key]) for key in keys),
+        ]
+        for file, each in zip(files, found, strict=True)
+    ]
+    console.print_table(f"{len(found)} materials", ["material", *(COLUMNS[key] for key in keys)], rows)
 
 
 def _cell(key: str, value: Any) -> str:
