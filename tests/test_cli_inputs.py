@@ -107,7 +107,7 @@ def test_info_of_several_is_a_table(capsys, folder):
         ["b.smrl", "paper"],
         ["c.smrl", "paper"],
     ]
-    assert "8 × 8 × 12" in rows[0]
+    assert "8×8×12" in rows[0]
     listed = run_json(capsys, "info", folder / "a.smrl", "nickel")["materials"]
     assert [each["kind"] for each in listed] == ["som-man", "model"]
 

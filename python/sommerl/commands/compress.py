@@ -199,7 +199,11 @@ def fitted(brdf: Brdf, options: CompactOptions) -> tuple[SomManBrdf, CompactRepo
 
 
 def _judge(brdf: Brdf, options: CompactOptions) -> search.Quality | None:
-    """The renderer; without it or a compiler for it, the fit's own error has to do where a size is asked for."""
+    """A function that renders a material and gives its PSNR, by which candidates are chosen.
+
+    None without a renderer, if a size is asked for: the error of the fit then decides. Raises MissingDependencyError
+    without one, if a PSNR is asked for.
+    """
     try:
         require_compiler()
         return judge_on_sphere(brdf, default_environment())
@@ -227,7 +231,7 @@ def _rounded(value: Any) -> Any:
 
 
 def compression_rows(material: SomManBrdf, bytes_disk: int, report: TrainReport) -> dict[str, str]:
-    """What was reached, and at which size."""
+    """The figures of a material of the preset paper, for people."""
     dropped = f" ({report.units_dropped} units dropped)" if report.units_dropped else ""
     rows = {
         "clusters": f"{material.clusters}{dropped}",
@@ -244,7 +248,7 @@ def compression_rows(material: SomManBrdf, bytes_disk: int, report: TrainReport)
 def compact_rows(
     material: SomManBrdf, bytes_disk: int, report: CompactReport, counted: Mapping[str, Any]
 ) -> dict[str, str]:
-    """The same of the preset compact. counted: what `clamped` says of the source."""
+    """The figures of a material of the preset compact, for people. counted: what `clamped` says of the source."""
     rows = {
         "nodes": str(material.lattice.size),
         "palette": f"{len(material.gains)} gains, {len(material.lut)} shapes",

@@ -118,7 +118,7 @@ def _check(options: ConvertArguments) -> None:
 
 
 def _write(brdf: Brdf, options: ConvertArguments, extension: str) -> Brdf:
-    """Writes a material; returns what it was turned into for that."""
+    """Writes a material; returns it as it was written: resampled, compressed, or as it was."""
     output: Path = options.output
     if isinstance(brdf, SomManBrdf) and extension == ".smrl":
         smrl.save(brdf, output)
@@ -139,14 +139,14 @@ def _write(brdf: Brdf, options: ConvertArguments, extension: str) -> Brdf:
 
 
 def _compressed(brdf: Brdf, options: ConvertArguments) -> SomManBrdf:
-    """A material as it is if it is compressed, unless a size is asked for."""
+    """The material compressed: to the size that is asked for; else as it is, or with the defaults of `compress`."""
     if options.target_size is not None:
         return fitted(brdf, _compact(options))[0]
     return brdf if isinstance(brdf, SomManBrdf) else trained(BrdfTable.of(brdf), TrainOptions())[0]
 
 
 def _report(brdf: Brdf, output: Path) -> dict[str, Any]:
-    """What the data lacks; and, written before anything else, a picture of where samples were missing."""
+    """What the reader reports of the data; of samples, a picture of where none were measured is written, too."""
     facts = brdf.facts
     result: dict[str, Any] = {"facts": facts} if facts else {}
     if isinstance(brdf, ScatteredTable):

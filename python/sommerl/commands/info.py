@@ -89,4 +89,4 @@ def _print_table(found: Sequence[Mapping[str, Any]]) -> None:
 def _cell(key: str, value: Any) -> str:
     if value is None:
         return ""
-    return console.size(value) if key in SIZES else text(value)
+    return console.size(value) if key in SIZES else text(value).replace(" × ", "×")

@@ -31,7 +31,7 @@ class PartlyDone(MaterialError):
 
 
 def asks_for_json(arguments: Sequence[str]) -> bool:
-    """Whether a command line asks for JSON, also one that cannot be read otherwise."""
+    """Whether --json, or a beginning of it, is among the options, also if the others make no sense."""
     options = arguments[: arguments.index("--")] if "--" in arguments else arguments
     return any(len(word) > 2 and "--json".startswith(word) for word in options)
 
@@ -69,7 +69,7 @@ def outcome(command: Callable[[], Mapping[str, Any] | None], *, as_json: bool) -
 
 
 def fail(message: str, status: int, known: Mapping[str, Any] | None = None, *, as_json: bool = False) -> int:
-    """Says what went wrong, and hands on the exit status. known: what an answer as JSON holds besides."""
+    """Says what went wrong, and returns the exit status. known: what the object holds besides, if it is JSON."""
     tell(f"error: {message}")
     if as_json:
         with suppress(OSError):  # if standard output takes nothing, the sentence is told all the same
@@ -113,7 +113,7 @@ def _flushed(stream: TextIO, number: int) -> bool:
 
 
 def _unexpected(error: BaseException) -> str:
-    """One sentence on an error that nobody thought of; where it came from is told before, if one asks for it."""
+    """A sentence on an error that is none of Sommerl's own. With SOMMERL_DEBUG=1, the traceback is printed before."""
     if os.environ.get(DEBUG) == "1":
         for line in "".join(traceback.format_exception(error)).splitlines():
             tell(visible(line))

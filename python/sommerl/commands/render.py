@@ -94,7 +94,10 @@ class Pair:
 
 
 class Materials:
-    """Materials of pairs, looked up as asked. The last few are kept, so that few are read twice and many fit."""
+    """Reads the materials of pairs, with the lookup that is asked for.
+
+    The last eight are kept in memory: few are read twice, and a sheet may have more materials than fit.
+    """
 
     def __init__(self, lookup: Any) -> None:
         self._lookup = lookup
@@ -115,7 +118,7 @@ class Materials:
 
 @dataclass(frozen=True)
 class Setting:
-    """What a scene is made of besides its materials; None for what is its own."""
+    """The light and the object of a scene, where the user gave them; None where the scene has its own."""
 
     environment: NDArray[np.float32] | None
     mesh: Mesh | None
@@ -189,7 +192,7 @@ def _render(options: RenderArguments) -> dict[str, Any]:
 
 
 def _outputs(options: RenderArguments, pairs: Sequence[Pair]) -> dict[str, Path]:
-    """The files of a comparison, by what they show."""
+    """The files that --against writes beside the render, by what they show. Raises OptionError or OSError."""
     inputs = [*(pair.source for pair in pairs), *options.against, options.envmap, options.mesh]
     check_output(options.output, (".png", ".exr"), *inputs)
     check_apart(checkpoint_of(options.output), *inputs)
@@ -294,7 +297,9 @@ def _setting(job: Job) -> Setting:
 def _rendered(
     job: Job, pairs: list[Pair], materials: Materials, setting: Setting, checkpoint: Checkpoint
 ) -> tuple[list[Image], list[Image]]:
-    """The images of the materials, and those of the references, none if there are none: one of a scene, many of a grid.
+    """The images of the materials, and those of the references, or none if there is no reference.
+
+    A scene is one image; a grid has an image for each material.
 
     Both are rendered with the references' samplers and the same seed, hence with the same directions.
     """
@@ -329,7 +334,7 @@ def _rendered(
 
 
 def _compared(job: Job, pairs: Sequence[Pair], references: Sequence[Image], candidates: Sequence[Image]) -> Comparison:
-    """The images of a scene, or those spheres of a grid that have a reference, each without empty places."""
+    """Measures how far the candidates are from the references; of a grid, over the spheres that have a reference."""
     if job.scene == GRID:
         held = [pair.against is not None for pair in pairs]
         references, candidates = (list(compress(images, held)) for images in (references, candidates))
@@ -339,19 +344,20 @@ def _compared(job: Job, pairs: Sequence[Pair], references: Sequence[Image], cand
 
 
 def _held_against(shown: Sequence[Mapping[str, Any]]) -> tuple[str, str]:
-    """What the references are called, and what is held against them. shown: of `_described`."""
+    """The labels of the references, and of the materials that are compared with them. shown: of `_described`."""
     found = [one for one in shown if one["reference"] is not None]
     return ", ".join(one["reference"] for one in found), ", ".join(one["label"] for one in found)
 
 
 def _sheet(images: Sequence[Image], columns: int = 0) -> Image:
-    """One image of several, in rows, linear."""
+    """One image of several: rows of `columns`, or of as many as `_columns` says; linear."""
     columns = columns or _columns(len(images))
     return Image(tiled([image.pixels for image in images], columns), tiled([image.mask for image in images], columns))
 
 
 def _columns(count: int) -> int:
-    """Of a sheet: at least as many as rows, and with the fewest empty places among those less than twice the root."""
+    """How many columns a sheet of so many images has: no fewer than rows, fewer than twice the square root of the
+    count, and of these the number that leaves the fewest places empty."""
     least = math.ceil(math.sqrt(count))
     return min(range(least, 2 * least), key=lambda columns: (-count % columns, columns))
 
@@ -370,7 +376,7 @@ def _write(path: Path, images: Sequence[Image], scale: float, pairs: Sequence[Pa
 
 
 def _write_against(outputs: dict[str, Path], comparison: Comparison, names: tuple[str, str]) -> None:
-    """Writes what shows a comparison, but for the render itself and the reference."""
+    """Writes the difference as EXR; or, as PNG, reference, render, difference, FLIP and figures on one sheet."""
     if "difference" in outputs:
         write_image(outputs["difference"], comparison.candidate.pixels - comparison.reference.pixels)
         return

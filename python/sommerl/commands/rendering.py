@@ -1,4 +1,4 @@
-"""What the commands that render share: their options, the light, and how a long render tells of itself."""
+"""What the commands that render share: options, the environment, and progress that can be resumed."""
 
 from __future__ import annotations
 
