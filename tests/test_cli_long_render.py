@@ -17,7 +17,9 @@ SMALL = ["--size", "24", "--spp", "4"]
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 EAGER = """
 import sys
+from sommerl.commands import console
 from sommerl.render import checkpoint, passes
+console.INTERVAL = 1e9
 checkpoint.SECONDS = 0.0
 passes.SAMPLES_A_PASS = 2**14
 from sommerl.__main__ import main

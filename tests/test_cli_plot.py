@@ -22,7 +22,8 @@ def test_everything_that_applies_is_on_one_sheet(capsys, smrl, tmp_path, extensi
     path = tmp_path / f"x.{extension}"
     result = run_json(capsys, "plot", smrl, "-o", path)
     name = "pearl-paint (SGD stand-in)"
-    assert result == {"image": str(path), "kinds": list(plots.KINDS), "materials": [name]}
+    drawn = {"input": str(smrl), "name": name, "label": name}
+    assert result == drawn | {"image": str(path), "kinds": list(plots.KINDS), "materials": [drawn], "warnings": []}
     assert path.read_bytes().startswith(HEADS[extension])
     assert list(tmp_path.iterdir()) == [path]
     again = tmp_path / f"again.{extension}"
@@ -46,8 +47,9 @@ def test_materials_of_one_name_are_told_apart(capsys, smrl, tmp_path):
         capsys, "plot", "pearl-paint", smrl, copy, "nickel", "-o", tmp_path / "x.png", "--kind", "theta-h"
     )
     name = "pearl-paint (SGD stand-in)"
-    others = [f"pearl.smrl: {name}", f"{copy}: {name}"]
-    assert result["materials"] == [name, *others, "nickel (SGD stand-in)"]
+    others = [f"{smrl}: {name}", f"{copy}: {name}"]
+    assert [each["label"] for each in result["materials"]] == [name, *others, "nickel (SGD stand-in)"]
+    assert [each["name"] for each in result["materials"]] == [*[name] * 3, "nickel (SGD stand-in)"]
 
 
 @pytest.mark.parametrize(
@@ -55,13 +57,13 @@ def test_materials_of_one_name_are_told_apart(capsys, smrl, tmp_path):
     [
         (["nickel", "-o", "{}/x.gif"], 2, "expected a name that ends in .png or .pdf or .svg, found '.gif'"),
         (["nickel", "-o", "{}/x"], 2, "expected a name that ends in .png or .pdf or .svg, found ''"),
-        (["nickel", "-o", "{}/no/folder/x.png"], 1, "there is no folder"),
+        (["nickel", "-o", "/dev/null/x.png"], 1, "/dev/null: expected a folder, found something else"),
         (["nickel", "-o", "/proc/x.png"], 1, "/proc/x.png: cannot be written"),
         (["nickel"], 2, "required: -o/--output"),
         (["-o", "{}/x.png"], 2, "required: MATERIAL"),
         (["{}/none.smrl", "-o", "{}/x.png"], 1, "none.smrl: there is no such file"),
         (["nickle", "-o", "{}/x.png"], 1, "did you mean nickel?"),
-        (["nickel", "-o", "{}/x.png", "--kind", "lobe"], 2, "invalid choice: 'lobe' (choose from"),
+        (["nickel", "-o", "{}/x.png", "--kind", "lobe"], 2, "; did you mean lobes?"),
         (
             ["nickel", "-o", "{}/x.png", "--kind", "palette"],
             1,
@@ -69,8 +71,8 @@ def test_materials_of_one_name_are_told_apart(capsys, smrl, tmp_path):
         ),
         (["nickel", "-o", "{}/x.png", "--kind", "usage"], 1, "nickel (SGD stand-in): expected a compressed material"),
         (["nickel", "-o", "{}/x.png", "--kind", "hits"], 1, "expected a material on a lattice of cells"),
-        (["nickel", "nickel", "-o", "{}/x.png"], 2, "materials: expected different ones, found nickel twice"),
-        (["nickel"] * 6 + ["-o", "{}/x.png"], 2, "materials: expected 1 to 5, found 6"),
+        (["nickel", "nickel", "-o", "{}/x.png"], 2, "MATERIAL: expected different ones, found nickel twice"),
+        (["nickel"] * 6 + ["-o", "{}/x.png"], 2, "MATERIAL: expected 1 to 5, found 6"),
     ],
 )
 def test_what_cannot_be_drawn(capsys, tmp_path, arguments, status, message):

@@ -56,7 +56,7 @@ def test_materials_are_put_into_the_scene_in_order(capsys, folder, tmp_path):
     given = [folder / "pearl-paint.smrl", "chrome"]
     rest = "-o", tmp_path / "x.png", *SMALL
     result = run_json(capsys, "render", "--scene", "still-life", *given, *rest)
-    names = [name.split(" ")[0] for name in result["materials"]]
+    names = [each["label"].split(" ")[0] for each in result["materials"]]
     assert names == ["pearl-paint", "chrome", "blue-metallic-paint"]
     # A lookup is for what is given: the scene's own materials are formulas.
     result = run_json(capsys, "render", "--scene", "still-life", given[0], "--lookup", "trilinear", *rest)
@@ -97,7 +97,7 @@ def test_against_a_reference(capsys, folder, tmp_path, scene):
     assert result.keys() >= KEYS | COMPARE_KEYS
     assert 10 < result["psnr_object_db"] < result["psnr_frame_db"] < 80
     assert result["reference"] == "nickel (SGD stand-in) (formula)"
-    assert result["candidate"] == "nickel (SGD stand-in) (nearest)"
+    assert result["candidate"] == "nickel.smrl: nickel (SGD stand-in) (nearest)"
     files = sorted(file.name for file in tmp_path.iterdir())
     assert files == ["out.against.png", "out.png", "out.reference.png"]
     sheet = picture(tmp_path / "out.against.png")
@@ -149,17 +149,17 @@ def test_a_mesh_without_normals_renders_and_says_so(capsys, tmp_path):
         (
             ["--scene", "still-life", "nickel", "nickel", "nickel", "nickel"],
             2,
-            "materials: expected at most 3 in still-life, found 4",
+            "MATERIAL: expected at most 3 in still-life, found 4",
         ),
-        (["nickel", "--against", "nickel", "--against", "nickel"], 2, "against: expected at most 1, found 2"),
+        (["nickel", "--against", "nickel", "--against", "nickel"], 2, "--against: expected at most 1, found 2"),
         (["nickel", "--against", "nickle"], 1, "did you mean nickel"),
         (["--scene", "grid", "nickel", "nickle"], 1, "did you mean nickel"),
         (["--scene", "grid", "{}/bad"], 1, "expected a folder with materials, found none"),
         (["--scene", "grid", "{}/empty"], 1, "expected a folder with materials, found none"),
         (["--scene", "statue", "{}/empty"], 1, "found a directory"),
-        (["--scene", "grid", *["nickel"] * 20, "--size", "2048"], 2, "size: expected at most 1831 for 20 materials"),
-        (["--scene", "statue", "--size", "0"], 2, "size: expected 8 to"),
-        (["--scene", "grid", "--spp", "0"], 2, "spp: expected 1 to"),
+        (["--scene", "grid", *["nickel"] * 20, "--size", "2048"], 2, "--size: expected at most 1831 for 20 materials"),
+        (["--scene", "statue", "--size", "0"], 2, "--size: expected 8 to"),
+        (["--scene", "grid", "--spp", "0"], 2, "--spp: expected 1 to"),
         (["--envmap", "{}/light.exr", "-o", "{}/light.exr"], 2, "expected an output other than the input"),
     ],
 )

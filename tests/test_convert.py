@@ -153,8 +153,8 @@ def test_spectral(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["nickel", "{}/x.h", "--spectral"], "spectral: expected an output that ends in .bsdf"),
-        (["nickel", "{}/x.xml", "--noise", "1"], "noise: expected an output that holds the material"),
+        (["nickel", "{}/x.h", "--spectral"], "--spectral: expected an output that ends in .bsdf"),
+        (["nickel", "{}/x.xml", "--noise", "1"], "--noise: expected an output that holds the material"),
         (["nickel", "{}/x"], "expected a name that ends in"),
     ],
 )

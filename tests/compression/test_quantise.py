@@ -259,9 +259,9 @@ def test_one_that_fails_does_not_hold_up_the_others(capsys, tmp_path, monkeypatc
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["--preset", "paper", "--target-size", "800"], "target_size: expected --preset compact, found paper"),
-        (["--target-size", "800", "--clusters", "9"], "clusters: expected --preset paper, found compact"),
-        (["--target-size", "8"], "target_size: expected 300 to 64000, found 8"),
+        (["--preset", "paper", "--target-size", "800"], "--target-size: expected --preset compact, found paper"),
+        (["--target-size", "800", "--clusters", "9"], "--clusters: expected --preset paper, found compact"),
+        (["--target-size", "8"], "--target-size: expected 300 to 64000, found 8"),
     ],
 )
 def test_bad_arguments(capsys, tmp_path, arguments, sentence):

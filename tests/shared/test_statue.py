@@ -19,4 +19,5 @@ def test_psnr_is_at_least_the_papers(capsys, stand_in, buddha, tmp_path, own):
     assert err.splitlines() == [f"warning: {sentence}" for sentence in sentences]
     assert found["psnr_object_db"] >= 52.5
     assert found["psnr_frame_db"] > found["psnr_object_db"]
-    assert (found["reference"], found["candidate"]) == ("blue-metallic-paint (nearest)",) * 2
+    assert found["reference"] == "blue-metallic-paint.binary (nearest)"
+    assert found["candidate"] == "blue.smrl: blue-metallic-paint (nearest)"

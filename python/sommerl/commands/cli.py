@@ -1,11 +1,9 @@
-"""The command line: parses, calls, prints. All defaults are the library's."""
+"""The command line: puts the commands together, and runs one. All defaults are the library's."""
 
 from __future__ import annotations
 
 import argparse
 import io
-import json
-import math
 import sys
 import warnings
 from collections.abc import Mapping, Sequence
@@ -16,8 +14,11 @@ from ..formats.registry import listed, readable
 from ..models.builtin import NAMES
 from ..system import threads
 from ..system.files import keeping
-from . import compare, compress, console, convert, demo, factor, fit, info, paper, plot, render
-from .outcome import outcome
+from . import compare, completion, compress, convert, demo, factor, fit, info, paper, plot, render
+from .arguments import WritingArguments, read
+from .console import warn
+from .folders import empty_ones_removed
+from .outcome import asks_for_json, outcome
 from .parser import Parser
 
 DESCRIPTION = """\
@@ -40,7 +41,7 @@ Examples:
 
 
 # In the order in which help lists them.
-COMMANDS = (demo, compress, info, convert, compare, fit, factor, render, plot, paper)
+COMMANDS = (demo, compress, info, convert, compare, fit, factor, render, plot, paper, completion)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -48,44 +49,47 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # not every terminal has a multiplication sign
+    typed = sys.argv[1:] if arguments is None else list(arguments)
+    warn.told.clear()
+    return outcome(lambda: _run(typed), as_json=asks_for_json(typed))
 
-    def command() -> None:
-        options = _parser().parse_args(arguments)
-        if options.threads is not None:
-            threads.use(threads.checked(options.threads, threads.OPTION))
-        threads.limit()
-        with warnings.catch_warnings(), keeping(overwrite=getattr(options, "overwrite", False)):
-            warnings.showwarning = _warned
-            result = options.run(options)
-        if options.json:
-            print(json.dumps(_finite(result), indent=2))
 
-    return outcome(command)
+def _run(typed: Sequence[str]) -> Mapping[str, Any] | None:
+    """What one command answers; None where there was nothing to do but to print help."""
+    all_commands = parser()
+    found, unknown = all_commands.parse_known_args(typed)
+    if found.command is None:
+        if unknown:
+            all_commands.unknown(unknown[0])
+        all_commands.print_help()
+        return None
+    if unknown:
+        found.parser.unknown(unknown[0])
+    options = read(found.arguments, found)
+    if options.threads is not None:
+        threads.use(threads.checked(options.threads, threads.OPTION))
+    threads.limit()
+    overwrite = isinstance(options, WritingArguments) and options.overwrite
+    with warnings.catch_warnings(), keeping(overwrite=overwrite), empty_ones_removed():
+        warnings.showwarning = _warned
+        return found.run(options)
 
 
 def _warned(message: Warning | str, *_: Any, **__: Any) -> None:
     """Tells a warning of Python's without the line of code that it comes from."""
-    console.tell(f"warning: {message}")
+    warn(str(message))
 
 
-def _finite(value: Any) -> Any:
-    """The same, with null for the numbers that JSON lacks (the PSNR of identical images)."""
-    if isinstance(value, Mapping):
-        return {key: _finite(item) for key, item in value.items()}  # pyright: ignore[reportUnknownVariableType]
-    if isinstance(value, list):
-        return [_finite(item) for item in value]  # pyright: ignore[reportUnknownVariableType]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _parser() -> Parser:
-    parser = Parser(
+def parser() -> Parser:
+    """The parser of all commands."""
+    made = Parser(
         prog="sommerl",
         description=DESCRIPTION,
         epilog=f"Formats:\n{listed(readable())}\n\n{BUILT_IN}\n\n{EXAMPLES}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="version", version=f"sommerl {__version__}")
-    add = parser.add_subparsers(metavar="COMMAND", required=True, dest="command").add_parser
+    made.add_argument("--version", action="version", version=f"sommerl {__version__}")
+    add = made.add_subparsers(metavar="COMMAND", dest="command").add_parser
     for module in COMMANDS:
         module.arguments(add)
-    return parser
+    return made

@@ -2,73 +2,90 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from ..formats.load import load
 from ..reflectance.brdf import Brdf
 from ..reflectance.distance import table_metrics
-from ..reflectance.lattice import INTERPOLATIONS
+from ..reflectance.lattice import Interpolation
 from ..reflectance.table import BrdfTable
 from ..render.compare import compare_on_sphere
 from ..render.images import side_by_side, write_image
-from . import console
-from .checks import check_output, check_rendering, environment_of
-from .parser import command, rendering_options
-from .rows import image_rows, label, table_rows
+from . import answers, console
+from .arguments import Material, option, positional
+from .checks import check_output
+from .inputs import labels
+from .parser import add_command
+from .rendering import RenderingArguments, Sampling, check_environment, environment_of
+from .rows import image_rows, table_rows
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompareArguments(RenderingArguments):
+    """What `compare` is asked for."""
+
+    reference: Material = positional("A", help="the reference: a file or a built-in name")
+    candidate: Material = positional("B", help="what is held against it: a file or a built-in name")
+    output: Path | None = option(
+        "-o", default=None, metavar="FILE", help="a .png with A, B and their difference (×8) side by side"
+    )
+    lookup: Interpolation | None = option(
+        default=None,
+        help="how both are looked up; if not given: a compressed material as it is, a table as the compressed one on "
+        "its lattice, so that the figures measure the compression alone, else trilinear",
+    )
 
 
 def arguments(add: Any) -> None:
     """Adds the command to the command line."""
-    summary = "Renders two materials on a sphere and says how far they are apart, there and cell by cell."
-    example = "sommerl compare nickel.binary nickel.smrl -o both.png"
-    parser = command(add, "compare", compare, summary, example)
-    parser.add_argument("reference", metavar="A")
-    parser.add_argument("candidate", metavar="B")
-    parser.add_argument("-o", "--output", type=Path, help="a .png with A, B and their difference (×8) side by side")
-    parser.add_argument(
-        "--lookup",
-        choices=INTERPOLATIONS,
-        help="how both are looked up; if not given: a compressed material as it is, a table as the compressed one on "
-        "its lattice, so that the figures measure the compression alone, else trilinear",
+    summary = (
+        "Renders a reference and another material on a sphere, and says how far apart they are, there and in cells."
     )
-    rendering_options(parser)
+    example = "sommerl compare nickel.binary nickel.smrl -o both.png"
+    add_command(add, "compare", compare, CompareArguments, summary, example)
 
 
-def compare(options: Namespace) -> dict[str, Any]:
+def compare(options: CompareArguments) -> dict[str, Any]:
     if options.output:
         check_output(options.output, (".png",), options.reference, options.candidate, options.envmap)
-    reference, candidate = alike(load(options.reference), load(options.candidate), options.lookup)
-    check_rendering(options)
-    warnings = console.Warnings()
-    environment = environment_of(options, warnings)
+    sources = options.reference, options.candidate
+    brdfs = looked_up_alike(load(sources[0]), load(sources[1]), options.lookup)
+    sampling = Sampling.of(options)
+    check_environment(options.envmap)
+    environment = environment_of(options.envmap)
     with console.progress("rendering") as advance:
-        comparison = compare_on_sphere(
-            reference,
-            [candidate],
-            environment,
-            size=options.size,
-            spp=options.spp,
-            seed=options.seed,
-            progress=advance,
-        )[0]
+        comparison = compare_on_sphere(brdfs[0], [brdfs[1]], environment, **asdict(sampling), progress=advance)[0]
     if options.output:
         write_image(options.output, side_by_side(comparison.pictures()))
-    metrics = table_distance(reference, candidate)
-    result = comparison.metrics | {f"table_{name}": value for name, value in metrics.items()}
-    result |= {"reference": label(reference), "candidate": label(candidate), "warnings": warnings.told}
+    metrics = table_distance(*brdfs)
+    reference, candidate = (
+        f"{label} ({brdf.lookup})"
+        for label, brdf in zip(labels(sources, [brdf.name for brdf in brdfs]), brdfs, strict=True)
+    )
+    result: dict[str, Any] = comparison.metrics | {f"table_{name}": value for name, value in metrics.items()}
+    result |= {"reference": reference, "candidate": candidate}
     if options.output:
         result["image"] = str(options.output)
     if not options.json:
-        lookups = dict.fromkeys((reference.lookup, candidate.lookup))
+        lookups = dict.fromkeys((brdfs[1].lookup, brdfs[0].lookup))
         rows = {"lookup": " against ".join(lookups)} | image_rows(comparison.metrics) | table_rows(metrics)
-        console.print_rows(f"{options.reference} against {options.candidate}", rows)
-    return result
+        console.print_rows(f"{options.candidate} against {options.reference}", rows)
+        if options.output:
+            console.wrote([options.output])
+    materials = [
+        {"input": source, "name": brdf.name, "lookup": brdf.lookup} for source, brdf in zip(sources, brdfs, strict=True)
+    ]
+    return answers.of_materials(materials, **result)
 
 
-def alike(reference: Brdf, candidate: Brdf, asked: Any) -> tuple[Brdf, Brdf]:
-    """Both, looked up as asked; else a table as the SOM-MAN material on its lattice, so that like meets like."""
+def looked_up_alike(reference: Brdf, candidate: Brdf, asked: Interpolation | None) -> tuple[Brdf, Brdf]:
+    """Two materials with one lookup, so that a comparison measures what they hold and not how they are looked up.
+
+    asked: the lookup for both. If None, a table is looked up as the compressed material that it is compared with, if
+    both have one lattice; everything else as it is. Raises MaterialError for a formula that is asked to be looked up.
+    """
 
     def adapted(brdf: Brdf, other: Brdf) -> Brdf:
         if asked:

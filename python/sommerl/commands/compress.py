@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
-from dataclasses import asdict, fields
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal
 
 from ..compression.compact.search import DEFAULT_PSNR, LARGEST_SIZE, SMALLEST_SIZE, CompactOptions, CompactReport
 from ..compression.material import SomManBrdf
@@ -19,153 +19,185 @@ from ..reflectance.info import Counts
 from ..reflectance.metric import decibels
 from ..reflectance.table import BrdfTable
 from ..render.compress import compress as compressed
-from ..system.errors import MaterialError, OptionError, SommerlError
-from . import console
-from .checks import check_output, stem
-from .parser import command
-from .rows import describe, fact_rows, origin_rows, table_rows
+from ..system.errors import OptionError, SommerlError
+from . import answers, console
+from .arguments import Material, WritingArguments, byte_count, flag, library_options, option, positional
+from .checks import check_output
+from .folders import make_folder
+from .inputs import expanded, is_several, readable, stem
+from .outcome import PartlyDone
+from .parser import add_command
+from .rows import fact_rows, origin_rows, table_rows
 
 DEFAULTS = TrainOptions()
-
-
 METRICS_DIGITS = 6  # so that the file does not hold the last bits of a machine's sums
+
+Preset = Literal["paper", "compact"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompressArguments(WritingArguments):
+    """What `compress` is asked for."""
+
+    inputs: tuple[Material, ...] = positional(
+        "IN", help="a material: a file, a built-in name, a folder of materials, or a pattern in quotes"
+    )
+    output: Path = option(
+        "-o", metavar="OUT", help="a .smrl file; or, for any number of inputs, a folder, which is made if there is none"
+    )
+    preset: Preset | None = option(
+        default=None,
+        help="paper: MERL's lattice, nearest lookup; compact: a lattice fitted to the material, interpolated, in a "
+        "file of some kilobytes (paper; compact if there is a target)",
+    )
+    target_size: int | None = option(
+        default=None,
+        metavar="BYTES",
+        read=byte_count,
+        instead_of="target",
+        help=f"compact: the best file of at most that size, {SMALLEST_SIZE} to {LARGEST_SIZE} bytes, also as 8kB",
+    )
+    target_psnr: float | None = option(
+        default=None,
+        metavar="DB",
+        instead_of="target",
+        help=f"compact: the smallest file of at least that quality on a rendered sphere ({DEFAULT_PSNR:g})",
+    )
+    clusters: int = option(
+        default=DEFAULTS.clusters, metavar="M", help="paper: the number of entries in the palette (%(default)s)"
+    )
+    epochs: int = option(
+        default=DEFAULTS.epochs, metavar="E", help="paper: how often the table is presented (%(default)s)"
+    )
+    seed: int = option(default=DEFAULTS.seed, metavar="S", help="of directions, first weights and order (%(default)s)")
+    rule: Rule = option(
+        default=DEFAULTS.rule,
+        help="paper: Eq. 2 as printed (paper), or without its factor x (kohonen) (%(default)s)",
+    )
+    alpha: float = option(
+        default=DEFAULTS.alpha, metavar="A", help="paper: first learning rate, above 0, at most 1 (%(default)s)"
+    )
+    order: Order = option(default=DEFAULTS.order, help="paper: of presentation (%(default)s)")
+    radius: float = option(
+        default=DEFAULTS.radius,
+        metavar="R",
+        help="paper: of the neighbourhood in the first epoch, in units; 0: the winner learns alone (%(default)s)",
+    )
+    topology: Topology = option(
+        default=DEFAULTS.topology, help="paper: how the units are arranged for that (%(default)s)"
+    )
+    distinct: bool = option(
+        default=DEFAULTS.distinct, help="paper: a unit stores a cell once at most, and not again in a later epoch"
+    )
 
 
 def arguments(add: Any) -> None:
     """Adds the command to the command line."""
     summary = "Compresses materials by the paper's method (SOM-MAN) into .smrl files."
     example = """sommerl compress nickel.binary -o nickel.smrl --clusters 1000
-  sommerl compress measured.bsdf -o measured.smrl --preset compact --target-size 2700
-  sommerl compress *.bsdf -o materials/ --preset compact --target-psnr 50"""
-    parser = command(add, "compress", compress, summary, example)
-    parser.add_argument("inputs", nargs="+", metavar="IN", help="a material: path or built-in name")
-    parser.add_argument(
-        "-o", "--output", type=Path, required=True, help="a .smrl file; for several inputs, a folder that exists"
-    )
-    parser.add_argument(
-        "--preset",
-        choices=["paper", "compact"],
-        help="paper: MERL's lattice, nearest lookup; compact: a lattice fitted to the material, interpolated, in a "
-        "file of some kilobytes (paper; compact if there is a target)",
-    )
-    target = parser.add_mutually_exclusive_group()
-    target.add_argument(
-        "--target-size",
-        type=int,
-        metavar="BYTES",
-        help=f"compact: the best file of at most that size ({SMALLEST_SIZE} to {LARGEST_SIZE})",
-    )
-    target.add_argument(
-        "--target-psnr",
-        type=float,
-        metavar="DB",
-        help=f"compact: the smallest file of at least that quality on a rendered sphere ({DEFAULT_PSNR:g})",
-    )
-    helps = {
-        "clusters": "paper: M, the number of entries in the palette",
-        "epochs": "paper: how often the table is presented",
-        "seed": "of directions, first weights and order",
-        "rule": "paper: Eq. 2 as printed (paper), or without its factor x (kohonen)",
-        "alpha": "paper: first learning rate, above 0, at most 1",
-        "order": "paper: of presentation",
-        "radius": "paper: of the neighbourhood in the first epoch, in units; 0: the winner learns alone",
-        "topology": "paper: how the units are arranged for that",
-        "distinct": "paper: a unit stores a cell once at most, and not again in a later epoch",
-    }
-    allowed = {"rule": get_args(Rule), "order": get_args(Order), "topology": get_args(Topology)}
-    for field in fields(TrainOptions):
-        default = getattr(DEFAULTS, field.name)
-        if isinstance(default, bool):
-            parser.add_argument(f"--{field.name}", action="store_true", help=helps[field.name])
-            continue
-        parser.add_argument(
-            f"--{field.name}",
-            type=type(default),
-            default=default,
-            choices=allowed.get(field.name),
-            metavar=None if field.name in allowed else field.name[0].upper(),
-            help=f"{helps[field.name]} (%(default)s)",
-        )
+  sommerl compress measured.bsdf -o measured.smrl --target-size 2.7kB
+  sommerl compress measured/ -o compressed/ --preset compact --target-psnr 50"""
+    add_command(add, "compress", compress, CompressArguments, summary, example)
 
 
-def compress(options: Namespace) -> dict[str, Any]:
-    targets = options.target_size, options.target_psnr
-    compact = (options.preset or ("paper" if targets == (None, None) else "compact")) == "compact"
-    method = _compact_options(options) if compact else _train_options(options)
-    outputs = _outputs(options.inputs, options.output)
-    if len(options.inputs) > 1:
-        for source in options.inputs:
-            load(source)  # so that a bad one is found before hours are spent on the others
+def compress(options: CompressArguments) -> dict[str, Any]:
+    """Compresses each material. Raises PartlyDone if some of several fail."""
+    method = _method(options)
+    sources = expanded(options.inputs)
+    outputs = _outputs(options, sources)
+    if len(sources) > 1:
+        kept = readable(sources, options.inputs)
+        outputs = [output for source, output in zip(sources, outputs, strict=True) if source in kept]
+        sources = kept
     results: list[dict[str, Any]] = []
     failed = 0
-    for source, output in zip(options.inputs, outputs, strict=True):
+    for source, output in zip(sources, outputs, strict=True):
         try:
             results.append(_compressed(source, output, method, options.json))
         except SommerlError as error:  # a target out of one material's reach is no reason to leave out the others
-            if len(options.inputs) == 1:
+            if len(sources) == 1:
                 raise
             failed += 1
+            results.append({"input": source, "error": str(error)})
             console.tell(f"error: {error}")
+    answer = answers.of_materials(results)
     if failed:
-        raise MaterialError(f"inputs: expected to compress {len(options.inputs)} materials, found {failed} that failed")
-    return results[0] if len(results) == 1 else {"materials": results}
+        raise PartlyDone(f"IN: expected to compress {len(sources)} materials, found {failed} that failed", answer)
+    return answer
 
 
 def _compressed(source: str, output: Path, method: CompactOptions | TrainOptions, quiet: bool) -> dict[str, Any]:
     if isinstance(method, CompactOptions):
-        return compact_one(load(source), output, method, quiet)
-    return compress_one(load_table(source), output, method, quiet)
+        return compact_one(source, load(source), output, method, quiet)
+    return compress_one(source, load_table(source), output, method, quiet)
 
 
-def _compact_options(options: Namespace) -> CompactOptions:
-    for name, default in asdict(TrainOptions()).items():
-        if name != "seed" and getattr(options, name) != default:
-            raise OptionError(f"{name}: expected --preset paper, found compact")
-    return CompactOptions(options.target_size, options.target_psnr, options.seed)
-
-
-def _train_options(options: Namespace) -> TrainOptions:
+def _method(options: CompressArguments) -> CompactOptions | TrainOptions:
+    """The options of the preset that is asked for. Raises OptionError for those of the other one."""
+    targets = options.target_size, options.target_psnr
+    preset = options.preset or ("paper" if targets == (None, None) else "compact")
+    if preset == "compact":
+        for each in fields(TrainOptions):
+            if each.name != "seed" and getattr(options, each.name) != getattr(DEFAULTS, each.name):
+                raise OptionError(f"{flag(each.name)}: expected --preset paper, found compact")
+        return library_options(CompactOptions, options)
     for name in ("target_size", "target_psnr"):
         if getattr(options, name) is not None:
-            raise OptionError(f"{name}: expected --preset compact, found paper")
-    return TrainOptions(**{field.name: getattr(options, field.name) for field in fields(TrainOptions)})
+            raise OptionError(f"{flag(name)}: expected --preset compact, found paper")
+    return library_options(TrainOptions, options)
 
 
-def _outputs(inputs: list[str], output: Path) -> list[Path]:
-    """Where each input goes."""
-    if len(inputs) == 1 and not output.is_dir():
+def _outputs(options: CompressArguments, sources: Sequence[str]) -> list[Path]:
+    """Where each material goes: into a folder if there are several, or if the output is one or has no extension."""
+    output = options.output
+    several = len(sources) > 1 or any(is_several(source) for source in options.inputs)
+    if output.suffix.lower() == ".smrl" and not output.is_dir():
+        if len(sources) > 1:
+            raise OptionError(f"{output}: expected a folder for {len(sources)} inputs, found the name of a file")
         outputs = [output]
-    elif output.is_dir():
-        outputs = [output / f"{stem(source)}.smrl" for source in inputs]
+    elif several or output.is_dir() or not output.suffix:
+        make_folder(output)
+        outputs = [output / f"{stem(source)}.smrl" for source in sources]
     else:
-        raise OptionError(f"{output}: expected a folder that exists, for several inputs")
-    if len(set(outputs)) < len(outputs):
-        raise OptionError("inputs: expected different names, found two that would be written to one file")
-    for source, path in zip(inputs, outputs, strict=True):
+        outputs = [output]
+    for source, path in zip(sources, outputs, strict=True):
         check_output(path, (".smrl",), source)
+        if outputs.count(path) > 1:
+            raise OptionError(f"IN: expected different names, found two that would be written to one file, {path}")
     return outputs
 
 
-def compress_one(table: BrdfTable, output: Path, options: TrainOptions, quiet: bool) -> dict[str, Any]:
+def compress_one(source: str, table: BrdfTable, output: Path, options: TrainOptions, quiet: bool) -> dict[str, Any]:
+    """Compresses a table by the preset paper into a file, and shows what came of it unless `quiet`.
+
+    source: where the table is from, as it was given.
+    """
     material, report = trained(table, options)
     written = smrl.save(material, output)
-    result = describe(material, written) | asdict(report) | {"epochs": options.epochs, "output": str(output)}
+    result = answers.described(source, material, written) | asdict(report)
     if not quiet:
         console.print_rows(f"{material.name} → {output}", compression_rows(material, written, report))
-    return result
+    return result | {"epochs": options.epochs, "output": str(output)}
 
 
-def compact_one(brdf: Brdf, output: Path, options: CompactOptions, quiet: bool) -> dict[str, Any]:
-    with console.progress(f"compressing {brdf.name}") as advance:
-        material, report = compressed(brdf, **asdict(options), progress=advance)
+def compact_one(source: str, brdf: Brdf, output: Path, options: CompactOptions, quiet: bool) -> dict[str, Any]:
+    """The same by the preset compact, for a material of any kind."""
+    material, report = fitted(brdf, options)
     written = smrl.save(material, output)
-    result = describe(material, written) | {"options": asdict(options), "psnr_object_db": report.psnr_db}
+    result = answers.described(source, material, written)
+    result |= {"options": asdict(options), "psnr_object_db": report.psnr_db}
     counts = brdf.counts
     result |= {"seconds": report.seconds, "output": str(output), **asdict(counts)}
     result |= dict.fromkeys(("epochs", "quantisation_error", "units_dropped"))
     if not quiet:
         console.print_rows(f"{material.name} → {output}", compact_rows(material, written, report, counts))
     return result
+
+
+def fitted(brdf: Brdf, options: CompactOptions) -> tuple[SomManBrdf, CompactReport]:
+    """Compresses by the preset compact under a progress bar."""
+    with console.progress(f"compressing {brdf.name}") as advance:
+        return compressed(brdf, **asdict(options), progress=advance)
 
 
 def trained(table: BrdfTable, options: TrainOptions) -> tuple[SomManBrdf, TrainReport]:
@@ -186,7 +218,7 @@ def _rounded(value: Any) -> Any:
 
 
 def compression_rows(material: SomManBrdf, bytes_disk: int, report: TrainReport) -> dict[str, str]:
-    """What was reached, and at which size."""
+    """The figures of a material of the preset paper, for people."""
     dropped = f" ({report.units_dropped} units dropped)" if report.units_dropped else ""
     rows = {
         "clusters": f"{material.clusters}{dropped}",
@@ -201,7 +233,7 @@ def compression_rows(material: SomManBrdf, bytes_disk: int, report: TrainReport)
 
 
 def compact_rows(material: SomManBrdf, bytes_disk: int, report: CompactReport, counts: Counts) -> dict[str, str]:
-    """The same of the preset compact. counts: of the source."""
+    """The figures of a material of the preset compact, for people. counts: of the source."""
     rows = {
         "nodes": str(material.lattice.size),
         "palette": f"{material.clusters - len(material.lut)} gains, {len(material.lut)} shapes",

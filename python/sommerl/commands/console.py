@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Generator, Mapping, Sequence
+import time
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from pathlib import Path
 
 from ..system.visible import visible
 
 Advance = Callable[[int, int], None]
+INTERVAL = 10.0  # seconds between lines about long work, where there is no terminal for a bar
 
 
 def say(*lines: str) -> None:
@@ -24,21 +27,32 @@ def tell(line: str) -> None:
 
 
 class Warnings:
-    """Tells what is not as expected, and keeps it: `told`."""
+    """Tells on standard error what is not as expected, and keeps it: `told`."""
 
     def __init__(self) -> None:
         self.told: list[str] = []
 
     def __call__(self, sentence: str) -> None:
-        self.told.append(sentence)
+        self.told.append(visible(sentence))
         tell(f"warning: {sentence}")
+
+
+warn = Warnings()  #: all warnings of the command that runs; the command line empties it before
+
+
+def wrote(paths: Iterable[Path | str]) -> None:
+    """Says which files were written."""
+    say("Wrote " + ", ".join(map(str, paths)))
 
 
 @contextmanager
 def progress(what: str) -> Generator[Advance | None]:
-    """A progress bar on standard error, if that is a terminal: a function of steps done and steps in all."""
+    """Says on standard error how far work has come: a function of steps done and steps in all.
+
+    A bar if that is a terminal; else a line every INTERVAL seconds, so that a log says what takes long.
+    """
     if not sys.stderr.isatty():
-        yield None
+        yield _lines(what)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -51,6 +65,20 @@ def progress(what: str) -> Generator[Advance | None]:
             bar.update(task, completed=done, total=total)
 
         yield advance
+
+
+def _lines(what: str) -> Advance:
+    """Tells how far work has come, in a line every INTERVAL seconds."""
+    started = last = time.monotonic()
+
+    def advance(done: int, total: int) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if done < total and now - last >= INTERVAL:
+            last = now
+            tell(f"{what}: {done / total:.0%} after {now - started:.0f} s")
+
+    return advance
 
 
 def print_rows(title: str, rows: Mapping[str, str]) -> None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import base64
 import html
 import time
-from argparse import Namespace
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,17 +24,32 @@ from ..render.images import encode, write_image
 from ..render.llvm import mitsuba
 from ..system.files import atomic_write, check_writable
 from ..system.visible import visible
-from . import console
+from . import answers, console
+from .arguments import WritingArguments, option
 from .compress import compression_rows, trained
-from .parser import command
-from .rows import describe, image_rows
+from .folders import make_folder
+from .parser import add_command
+from .rows import image_rows
 
 MATERIAL = "blue-metallic-paint"
 
 
-def demo(options: Namespace) -> dict[str, Any]:
+@dataclass(frozen=True, kw_only=True)
+class DemoArguments(WritingArguments):
+    """What `demo` is asked for."""
+
+    out: Path = option(default=Path("demo"), metavar="DIR", help="folder for the files (%(default)s)")
+
+
+def arguments(add: Any) -> None:
+    """Adds the command to the command line."""
+    summary = "Compresses a built-in material, renders reference, result and difference, and shows them on a page."
+    add_command(add, "demo", demo, DemoArguments, summary, "sommerl demo --out demo")
+
+
+def demo(options: DemoArguments) -> dict[str, Any]:
     mitsuba()  # what is missing for rendering is better said before training
-    options.out.mkdir(parents=True, exist_ok=True)
+    make_folder(options.out)
     paths = {
         key: options.out / name
         for key, name in {
@@ -72,24 +86,16 @@ def demo(options: Namespace) -> dict[str, Any]:
     write_page(paths["page"], f"Sommerl: {material.name}", pictures, rows, note)
     if not options.json:
         console.print_rows(material.name, rows)
-        console.say("Wrote " + ", ".join(map(str, paths.values())))
+        console.wrote(paths.values())
         console.say(f"Open {paths['page']} in a browser.")
-    return (
-        describe(material, written)
+    result = (
+        answers.described(MATERIAL, material, written)
         | asdict(report)
         | comparison.metrics
         | {"epochs": TrainOptions().epochs, "seconds_render": seconds}
         | {"output": {key: str(path) for key, path in paths.items()}}
     )
-
-
-def arguments(add: Any) -> None:
-    """Adds the command to the command line."""
-    summary = "Compresses a built-in material, renders reference, result and difference, and shows them on a page."
-    parser = command(add, "demo", demo, summary, "sommerl demo --out demo")
-    parser.add_argument(
-        "--out", type=Path, default=Path("demo"), metavar="DIR", help="folder for the files (%(default)s)"
-    )
+    return answers.of_materials([result])
 
 
 def write_page(

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import time
-from argparse import Namespace
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,27 +11,36 @@ from ..factored import file as fbrdf
 from ..factored.fit import FactorOptions
 from ..factored.fit import factor as factored
 from ..formats.load import load
-from . import console
+from . import answers, console
+from .arguments import Material, WritingArguments, library_options, option, positional
 from .checks import check_output
-from .parser import command
-from .rows import describe, fact_rows, origin_rows, text
+from .parser import add_command
+from .rows import fact_rows, origin_rows, text
 
 DEFAULTS = FactorOptions()
+
+
+@dataclass(frozen=True, kw_only=True)
+class FactorArguments(WritingArguments):
+    """What `factor` is asked for."""
+
+    material: Material = positional("MATERIAL", help="the material to factor: a file or a built-in name")
+    output: Path = option("-o", metavar="FILE", help="a .fbrdf file")
+    lobes: int = option(
+        default=DEFAULTS.lobes, metavar="N", help="J: products of the viewer's elevation and a lobe (%(default)s)"
+    )
+    terms: int = option(default=DEFAULTS.terms, metavar="N", help="K: of each lobe (%(default)s)")
 
 
 def arguments(add: Any) -> None:
     """Adds the command to the command line."""
     summary = "Factors a material into products of small tables, the representation of Lawrence et al. 2004."
-    parser = command(add, "factor", factor, summary, "sommerl factor nickel.binary -o nickel.fbrdf")
-    parser.add_argument("material", metavar="MATERIAL")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="a .fbrdf file")
-    for name, meaning in (("lobes", "J: products of the viewer's elevation and a lobe"), ("terms", "K: of each lobe")):
-        default = getattr(DEFAULTS, name)
-        parser.add_argument(f"--{name}", type=int, default=default, metavar="N", help=f"{meaning} (%(default)s)")
+    example = "sommerl factor nickel.binary -o nickel.fbrdf"
+    add_command(add, "factor", factor, FactorArguments, summary, example)
 
 
-def factor(options: Namespace) -> dict[str, Any]:
-    chosen = FactorOptions(options.lobes, options.terms)
+def factor(options: FactorArguments) -> dict[str, Any]:
+    chosen = library_options(FactorOptions, options)
     check_output(options.output, (".fbrdf",), options.material)
     brdf = load(options.material)
     started = time.perf_counter()
@@ -40,7 +48,7 @@ def factor(options: Namespace) -> dict[str, Any]:
         material = factored(brdf, chosen, progress=advance)
     seconds = time.perf_counter() - started
     written = fbrdf.save(material, options.output)
-    known = describe(material, written) | asdict(brdf.counts)
+    known = answers.described(options.material, material, written) | asdict(brdf.counts)
     if not options.json:
         rows = {
             "lobes × terms": text(known["terms"]),
@@ -52,4 +60,4 @@ def factor(options: Namespace) -> dict[str, Any]:
             "time": f"{seconds:.1f} s",
         }
         console.print_rows(f"{material.name} → {options.output}", rows)
-    return known | {"seconds": seconds, "output": str(options.output)}
+    return answers.of_materials([known | {"seconds": seconds, "output": str(options.output)}])

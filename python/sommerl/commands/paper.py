@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from argparse import Namespace
-from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -16,29 +15,19 @@ from ..reproduction import tables
 from ..system.errors import FormatError
 from ..system.files import atomic_write, check_writable
 from . import console
-from .parser import command
+from .arguments import WritingArguments, named_as_typed, option, positional
+from .folders import make_folder
+from .parser import add_command
 
 DEFAULTS = FitOptions()
-Rows = Sequence[tables.FitRow] | Sequence[tables.ImageRow]
 
 
-def _table1(data: Path | None, options: FitOptions, picture: Path, progress: tables.Progress | None) -> Rows:
-    return tables.table1(data, options, progress=progress)
-
-
-def _figure5(data: Path | None, options: FitOptions, picture: Path, progress: tables.Progress | None) -> Rows:
-    return tables.figure5(data, picture, options, progress=progress)
-
-
-def _figure6(data: Path | None, options: FitOptions, picture: Path, progress: tables.Progress | None) -> Rows:
-    return tables.figure6(data, picture, options, progress=progress)
-
-
-ITEMS: dict[str, tuple[str, Callable[[Path | None, FitOptions, Path, tables.Progress | None], Rows]]] = {
-    "table1": ("Table 1: errors of two-lobe fits", _table1),
-    "fig5": ("Fig. 5: blue-metallic-paint on a sphere", _figure5),
-    "fig6": ("Fig. 6: errors of three-lobe fits to green-metallic-paint", _figure6),
+TITLES = {
+    "table1": "Table 1: errors of two-lobe fits",
+    "fig5": "Fig. 5: blue-metallic-paint on a sphere",
+    "fig6": "Fig. 6: errors of three-lobe fits to green-metallic-paint",
 }
+DRAWN = ("fig5", "fig6")  # items with a picture beside their table
 
 HEADINGS = {
     "model": "model",
@@ -52,29 +41,68 @@ HEADINGS = {
 }
 
 
-def paper(options: Namespace) -> dict[str, Any]:
+@dataclass(frozen=True, kw_only=True)
+class PaperArguments(WritingArguments):
+    """What `paper` is asked for."""
+
+    item: str = positional("ITEM", default="all", choices=[*TITLES, "all"], help="one of those below (%(default)s)")
+    data: Path | None = option(
+        default=None,
+        metavar="DIR",
+        help="a folder with a file for each material, like purple-paint.binary, or an .npz archive of neural BRDFs; "
+        "if not given, the built-in stand-ins",
+    )
+    out: Path = option("-o", default=Path("paper"), metavar="DIR", help="folder for tables and pictures (%(default)s)")
+    samples: int = option(
+        default=DEFAULTS.samples, metavar="N", help="pairs of directions that models are fitted to (%(default)s)"
+    )
+    seed: int = option(default=DEFAULTS.seed, metavar="N", help="of directions and starts (%(default)s)")
+
+
+def arguments(add: Any) -> None:
+    """Adds the command to the command line."""
+    summary = "Makes the paper's tables and figures again, beside the figures that it prints."
+    example = "sommerl paper table1 --data MERL -o paper"
+    items = "\n".join(f"  {name:8}{title}" for name, title in TITLES.items())
+    add_command(add, "paper", paper, PaperArguments, summary, example, explained=[f"Items:\n{items}"])
+
+
+def paper(options: PaperArguments) -> dict[str, Any]:
     """Makes the items asked for. Raises FormatError if there is no such data."""
     if options.data and not options.data.exists():
         raise FormatError(f"{options.data}: expected a folder or an archive of materials, found none")
-    options.out.mkdir(parents=True, exist_ok=True)
-    chosen = FitOptions(samples=options.samples, seed=options.seed)
-    result: dict[str, Any] = {}
+    with named_as_typed():
+        chosen = FitOptions(samples=options.samples, seed=options.seed)
+    make_folder(options.out)
+    result: dict[str, Any] = {"input": str(options.data) if options.data else None, "output": []}
     files = {
-        item: [options.out / f"{item}.{extension}" for extension in ("csv", "png")]
-        for item in (ITEMS if options.item == "all" else [options.item])
+        item: [options.out / f"{item}.{extension}" for extension in ("csv", "png")[: 2 if item in DRAWN else 1]]
+        for item in (TITLES if options.item == "all" else [options.item])
     }
     for path in chain(*files.values()):
         check_writable(path)
-    for item, (target, picture) in files.items():
-        title, make = ITEMS[item]
+    for item, written in files.items():
+        title = TITLES[item]
         with console.progress(title) as advance:
-            rows = [asdict(row) for row in make(options.data, chosen, picture, advance)]
-        _write(target, rows)
+            rows = [asdict(row) for row in _made(item, options.data, chosen, written[-1], advance)]
+        _write(written[0], rows)
         result[item] = rows
+        result["output"] += map(str, written)
         if not options.json:
             _show(title, rows)
-            console.say(f"→ {target}", "")
+            console.say("→ " + ", ".join(map(str, written)), "")
     return result
+
+
+def _made(
+    item: str, data: Path | None, options: FitOptions, picture: Path, progress: tables.Progress | None
+) -> Sequence[tables.FitRow] | Sequence[tables.ImageRow]:
+    """The rows of an item; its picture, if it has one, is written."""
+    if item == "table1":
+        return tables.table1(data, options, progress=progress)
+    if item == "fig5":
+        return tables.figure5(data, picture, options, progress=progress)
+    return tables.figure6(data, picture, options, progress=progress)
 
 
 def _show(title: str, rows: Sequence[dict[str, Any]]) -> None:
@@ -96,33 +124,3 @@ def _write(path: Path, rows: Sequence[dict[str, Any]]) -> None:
     writer.writerows(rows)
     with atomic_write(path) as out:
         out.write(text.getvalue().encode())
-
-
-def arguments(add: Any) -> None:
-    """Adds the command to the command line."""
-    summary = "Makes the paper's tables and figures again, beside the figures that it prints."
-    parser = command(add, "paper", paper, summary, "sommerl paper table1 --data MERL -o paper")
-    listed = "\n".join(f"  {name:8}{title}" for name, (title, _) in ITEMS.items())
-    parser.epilog = f"Items:\n{listed}\n\n{parser.epilog}"
-    parser.add_argument("item", choices=[*ITEMS, "all"], nargs="?", default="all", help="(%(default)s)")
-    parser.add_argument(
-        "--data",
-        type=Path,
-        metavar="DIR",
-        help="a folder with a file for each material, like purple-paint.binary, or an .npz archive of neural BRDFs; "
-        "if not given, the built-in stand-ins",
-    )
-    parser.add_argument(
-        "-o",
-        "--out",
-        type=Path,
-        default=Path("paper"),
-        metavar="DIR",
-        help="folder for tables and pictures (%(default)s)",
-    )
-    for name, text in (
-        ("samples", "pairs of directions that models are fitted to"),
-        ("seed", "of directions and starts"),
-    ):
-        default = getattr(DEFAULTS, name)
-        parser.add_argument(f"--{name}", type=int, default=default, metavar="N", help=f"{text} (%(default)s)")

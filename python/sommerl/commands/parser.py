@@ -1,22 +1,65 @@
-"""What the parsers of all commands share."""
+"""The parser of a command line, and what is said of one that cannot be read."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NoReturn
 
-from ..render.passes import DEFAULT_SIZE, DEFAULT_SPP
-from ..system import threads
-from ..system.visible import visible
+from ..system.errors import OptionError
+from ..system.near import did_you_mean
+from .arguments import Arguments, add_to
 
 
 class Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line."""
+    """Raises OptionError, one sentence, for what cannot be read."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(2, f"error: {visible(message)} (see {self.prog} --help)\n")
+        sentence = message.removeprefix("argument ").replace("not allowed with argument", "not allowed beside")
+        raise OptionError(f"{sentence} (see {self.prog} --help)")
+
+    def parse_known_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # pyright: ignore
+        """As argparse does, but an option that there is not is told first, before those that are missing for it."""
+        for word in args or ():
+            if word == "--":
+                break
+            name = word.partition("=")[0]
+            if name.startswith("--") and " " not in name and self._is_unknown(name):
+                self.unknown(word)
+        return super().parse_known_args(args, namespace)
+
+    def unknown(self, word: str) -> NoReturn:
+        """Raises OptionError for an argument that has no meaning."""
+        if not word.startswith("-"):
+            self.error(f"{word}: expected no further argument, found one")
+        hint = did_you_mean(word.partition("=")[0], self._flags())
+        self.error(f"{word}: expected an option of {self.prog}, found none of that name{hint}")
+
+    def commands(self) -> list[Parser]:
+        """The parsers of the commands, if this is the one of all."""
+        found = [action for action in self._actions if isinstance(action, argparse._SubParsersAction)]  # pyright: ignore
+        return [command for action in found for command in action.choices.values()]  # pyright: ignore
+
+    def actions(self) -> list[argparse.Action]:
+        """All arguments that this one takes."""
+        return list(self._actions)
+
+    def _is_unknown(self, name: str) -> bool:
+        """Whether there is no such option; what comes after a command's name is left to its own parser."""
+        return not self.commands() and not any(known.startswith(name) for known in self._flags())
+
+    def _flags(self) -> list[str]:
+        return [name for action in self._actions for name in action.option_strings]
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is None or value in action.choices:
+            return
+        choices: Iterable[str] = action.choices
+        if isinstance(action, argparse._SubParsersAction):  # pyright: ignore
+            self.error(f"{value}: expected a command, found none of that name{did_you_mean(value, choices)}")
+        name = "/".join(action.option_strings) or action.metavar
+        self.error(f"{name}: expected {' or '.join(choices)}, found {value}{did_you_mean(value, choices)}")
 
     def _print_message(self, message: str, file: Any = None) -> None:
         """As argparse does, but that help which cannot be printed is an error."""
@@ -26,37 +69,27 @@ class Parser(argparse.ArgumentParser):
             super()._print_message(message, file)
 
 
-def command(add: Any, name: str, run: Any, summary: str, example: str, *, writes: bool = True) -> Any:
-    """Adds a command, with the options that all have. run: what it does. writes: whether it writes files."""
+def add_command(
+    add: Any,
+    name: str,
+    run: Callable[[Any], Any],
+    arguments: type[Arguments],
+    summary: str,
+    example: str,
+    *,
+    explained: Sequence[str] = (),
+) -> None:
+    """Adds a command to the command line.
+
+    run: what it does, given its `arguments`. summary: one sentence. example: command lines. explained: paragraphs that
+    its help has before the example.
+    """
     parser = add(
         name,
         help=summary[0].lower() + summary[1:].rstrip("."),
         description=summary,
-        epilog=f"Example:\n  {example}",
+        epilog="\n\n".join((*explained, f"Example:\n  {example}")),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
-    if writes:
-        parser.add_argument(
-            "--overwrite", action="store_true", help="replace files that Sommerl did not write, and measurements, too"
-        )
-    parser.add_argument(
-        threads.OPTION,
-        metavar="N",
-        help=f"the most that work at once ({threads.VARIABLE}; if not set, as many as there are processors)",
-    )
-    parser.set_defaults(run=run)
-    return parser
-
-
-def rendering_options(parser: Any) -> None:
-    """Adds the options that all renderings have."""
-    for name, default, text in (
-        ("spp", DEFAULT_SPP, "samples a pixel"),
-        ("size", DEFAULT_SIZE, "width and height in pixels"),
-        ("seed", 0, "of the random numbers"),
-    ):
-        parser.add_argument(f"--{name}", type=int, default=default, metavar="N", help=f"{text} ({default})")
-    parser.add_argument(
-        "--envmap", type=Path, metavar="FILE", help="a latitude-longitude image that lights the scene (a built-in one)"
-    )
+    add_to(parser, arguments)
+    parser.set_defaults(run=run, arguments=arguments, parser=parser)

@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from .. import plots
 from ..formats.load import load
-from ..reflectance.brdf import Brdf
 from ..system.errors import OptionError
-from . import console
+from . import answers, console
+from .arguments import Material, WritingArguments, option, positional
 from .checks import check_output
-from .parser import command
+from .inputs import labels
+from .parser import add_command
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlotArguments(WritingArguments):
+    """What `plot` is asked for."""
+
+    materials: tuple[Material, ...] = positional(
+        "MATERIAL", help=f"a file or a built-in name; of up to {plots.MOST_MATERIALS}, curves are drawn together"
+    )
+    output: Path = option("-o", metavar="FILE", help=f"a name that ends in {' '.join(plots.FORMATS)}")
+    kind: str = option(
+        default="all", choices=[*plots.KINDS, "all"], help="one of those below, or all that apply (%(default)s)"
+    )
 
 
 def arguments(add: Any) -> None:
@@ -20,46 +34,26 @@ def arguments(add: Any) -> None:
     summary = "Draws what a material is: lobes, slices, palette."
     example = """sommerl plot nickel.binary -o nickel.png
   sommerl plot nickel.binary nickel.smrl nickel.json:ggx --kind theta-h -o three.pdf"""
-    parser = command(add, "plot", plot, summary, example)
     kinds = "\n".join(f"  {name:10}{kind.shows}" for name, kind in plots.KINDS.items())
-    parser.epilog = f"Kinds:\n{kinds}\n\n{parser.epilog}"
-    parser.add_argument(
-        "materials", nargs="+", metavar="MATERIAL", help=f"up to {plots.MOST_MATERIALS}; curves are drawn together"
-    )
-    parser.add_argument(
-        "-o", "--output", type=Path, required=True, help=f"a name that ends in {' '.join(plots.FORMATS)}"
-    )
-    parser.add_argument(
-        "--kind",
-        choices=[*plots.KINDS, "all"],
-        default="all",
-        help="one of those below, or all that apply (%(default)s)",
-    )
+    add_command(add, "plot", plot, PlotArguments, summary, example, explained=[f"Kinds:\n{kinds}"])
 
 
-def plot(options: Namespace) -> dict[str, Any]:
+def plot(options: PlotArguments) -> dict[str, Any]:
     for source in options.materials:
         check_output(options.output, tuple(plots.FORMATS), source)
     if len(options.materials) > plots.MOST_MATERIALS:
-        raise OptionError(f"materials: expected 1 to {plots.MOST_MATERIALS}, found {len(options.materials)}")
-    materials = _by_name(options.materials)
-    figure, kinds = plots.sheet(materials, options.kind)
+        raise OptionError(f"MATERIAL: expected 1 to {plots.MOST_MATERIALS}, found {len(options.materials)}")
+    again = next((source for source in options.materials if options.materials.count(source) > 1), None)
+    if again:
+        raise OptionError(f"MATERIAL: expected different ones, found {again} twice")
+    brdfs = [load(source) for source in options.materials]
+    names = labels(options.materials, [brdf.name for brdf in brdfs])
+    figure, kinds = plots.sheet(dict(zip(names, brdfs, strict=True)), options.kind)
     plots.save(figure, options.output)
     if not options.json:
-        console.say(f"{', '.join(materials)} → {options.output} ({', '.join(kinds)})")
-    return {"image": str(options.output), "kinds": kinds, "materials": list(materials)}
-
-
-def _by_name(sources: list[str]) -> dict[str, Brdf]:
-    """Materials by their names; by name and source where that is the same, as of a table and what was made of it."""
-    again = next((source for source in sources if sources.count(source) > 1), None)
-    if again:
-        raise OptionError(f"materials: expected different ones, found {again} twice")
-    found = [(source, load(source)) for source in sources]
-    names = [brdf.name for _, brdf in found]
-    result: dict[str, Brdf] = {}
-    for source, brdf in found:
-        alone = names.count(brdf.name) == 1 or brdf.name.startswith(source)  # a built-in one's says where it is from
-        name = brdf.name if alone else f"{Path(source).name}: {brdf.name}"
-        result[f"{source}: {brdf.name}" if name in result else name] = brdf
-    return result
+        console.say(f"{', '.join(names)} → {options.output} ({', '.join(kinds)})")
+    drawn = [
+        {"input": source, "name": brdf.name, "label": name}
+        for source, brdf, name in zip(options.materials, brdfs, names, strict=True)
+    ]
+    return answers.of_materials(drawn, image=str(options.output), kinds=kinds)

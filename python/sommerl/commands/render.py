@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 import time
-from argparse import Namespace
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import compress
@@ -17,11 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..formats.load import load
-from ..formats.registry import by_extension, readable
-from ..models.builtin import NAMES
 from ..plots.contact_sheet import captioned, tiled
 from ..reflectance.brdf import Brdf
-from ..reflectance.lattice import INTERPOLATIONS
 from ..render.checkpoint import Checkpoint, checkpoint_of, content, content_of
 from ..render.compare import Comparison
 from ..render.frame import Image, Scene
@@ -29,27 +25,21 @@ from ..render.images import DIFFERENCE_GAIN, signed_difference, write_image
 from ..render.llvm import mitsuba
 from ..render.meshes import Mesh, load_mesh
 from ..render.metrics import exposure, flip_map, to_srgb8
-from ..render.passes import DEFAULT_SIZE, DEFAULT_SPP, render_all
+from ..render.passes import render_all
 from ..render.scene_registry import SCENES, make_scene
 from ..sampling import named
-from ..sampling.named import OURS, SAMPLERS
+from ..sampling.named import OURS
 from ..sampling.sampler import Sampler
 from ..system.errors import MaterialError, OptionError, SommerlError
-from . import console, render_own
-from .checks import (
-    check_apart,
-    check_output,
-    check_rendering,
-    environment_of,
-    goes_on_from,
-    stem,
-)
-from .compare import alike, table_distance
-from .console import Warnings
-from .parser import command, rendering_options
-from .rows import image_rows, label, table_rows
+from . import answers, console, render_own
+from .checks import check_apart, check_output
+from .compare import looked_up_alike, table_distance
+from .inputs import expanded, labels, stem
+from .parser import add_command
+from .render_arguments import DEFAULT_SCENE, RenderArguments
+from .rendering import Sampling, check_environment, environment_of, goes_on_from
+from .rows import image_rows, table_rows
 
-DEFAULTS = {"scene": "sphere", "spp": DEFAULT_SPP, "size": DEFAULT_SIZE, "sampler": named.OURS.name}
 MOST_PIXELS = 2**26  # of a sheet
 MOST_COMPARED = 2**23  # of one that is compared: the metrics take some 260 bytes for each
 WIDEST = 2048  # pixels that the four pictures of a comparison may take in one row
@@ -60,6 +50,32 @@ FILES = """Files:
   beside OUTPUT.png: OUTPUT.reference.png, and OUTPUT.against.png with reference, result, signed difference, FLIP and
   the figures; beside OUTPUT.exr: OUTPUT.reference.exr and OUTPUT.difference.exr, result minus reference, linear. In a
   grid, figures are of the spheres that have a reference."""
+
+
+def arguments(add: Any) -> None:
+    """Adds the command to the command line."""
+    summary = "Renders materials in a scene, or a scene of your own. PNG is exposed for the objects; EXR is linear."
+    example = """sommerl render nickel.smrl -o nickel.exr
+  sommerl render kitchen.xml -o kitchen.exr --spp 1024 -D wall=nickel.smrl
+  sommerl render --scene statue --mesh buddha.obj blue.smrl --against blue.binary -o blue.png
+  sommerl render --scene grid FOLDER --size 128 -o sheet.png"""
+    add_command(
+        add, "render", render, RenderArguments, summary, example, explained=[_scenes(), FILES, render_own.FILES]
+    )
+
+
+def _scenes() -> str:
+    """The scenes that come along, for help."""
+    lines: list[str] = []
+    for name, kind in SCENES.items():
+        own = f" ({', '.join(kind.materials)})" if kind.places > 1 else ""
+        lines.append(textwrap.fill(kind.summary + own, 118, initial_indent=f"  {name:12}", subsequent_indent=" " * 14))
+    return "Scenes:\n" + "\n".join(lines)
+
+
+def render(options: RenderArguments) -> dict[str, Any]:
+    own = render_own.scene_of(options)
+    return render_own.render(own, options) if own else _render(options)
 
 
 @dataclass(frozen=True)
@@ -73,9 +89,17 @@ class Pair:
     against: str | None = None
     given: bool = True
 
+    @property
+    def sources(self) -> tuple[str, str]:
+        """The reference and the material; the same twice if there is no reference."""
+        return self.against or self.source, self.source
+
 
 class Materials:
-    """Materials of pairs, looked up as asked. The last few are kept, so that few are read twice and many fit."""
+    """Reads the materials of pairs, with the lookup that is asked for.
+
+    The last eight are kept in memory: few are read twice, and a sheet may have more materials than fit.
+    """
 
     def __init__(self, lookup: Any) -> None:
         self._lookup = lookup
@@ -89,57 +113,67 @@ class Materials:
             reference = self._load(pair.against)
             if self._lookup and not pair.given:
                 return reference.with_interpolation(self._lookup), brdf
-            return alike(reference, brdf, lookup)
+            return looked_up_alike(reference, brdf, lookup)
         brdf = brdf.with_interpolation(lookup) if lookup else brdf
         return brdf, brdf
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What a scene is made of besides its materials; None for what is its own."""
+    """The light and the object of a scene, where the user gave them; None where the scene has its own."""
 
     environment: NDArray[np.float32] | None
     mesh: Mesh | None
 
 
-def render(options: Namespace) -> dict[str, Any]:
-    scene = render_own.scene_of(options)
-    if scene:
-        return render_own.render(scene, options)
-    chosen = {name: value for name, value in vars(options).items() if value is not None}
-    return _render(Namespace(**(vars(options) | DEFAULTS | chosen)))
+@dataclass(frozen=True)
+class Job:
+    """What is to be rendered of the scenes that come along: what was asked for, and defaults for the rest."""
+
+    asked: RenderArguments
+    scene: str
+    sampler: str
+    sampling: Sampling
+
+    @classmethod
+    def of(cls, options: RenderArguments) -> Job:
+        """Raises OptionError for what is out of range, FormatError for an environment that there is not."""
+        sampling = Sampling.of(options)
+        check_environment(options.envmap)
+        return cls(options, options.scene or DEFAULT_SCENE, options.sampler or OURS.name, sampling)
 
 
-def _render(options: Namespace) -> dict[str, Any]:
+def _render(options: RenderArguments) -> dict[str, Any]:
     """Renders one of the scenes that come along."""
-    warn = Warnings()
-    check_rendering(options)
-    pairs = _pairs(options)
+    job = Job.of(options)
+    pairs = _pairs(job)
     outputs = _outputs(options, pairs)
     materials = Materials(options.lookup)
-    pairs, identity, labels = _looked_at(pairs, materials, options, warn)
-    setting = _setting(options, warn)
-    identity |= {"scene": options.scene, "size": str(options.size), "sampler": options.sampler}
+    pairs, identity, shown = _read_all(pairs, materials, job)
+    setting = _setting(job)
+    identity |= {"scene": job.scene, "size": str(job.sampling.size), "sampler": job.sampler}
     if setting.environment is not None:
         identity["environment"] = content(setting.environment)
     if setting.mesh:
         identity["mesh"] = content(setting.mesh.positions, setting.mesh.faces, setting.mesh.normals)
-    checkpoint = Checkpoint(checkpoint_of(options.output), identity, (options.size, options.size), warn)
+    checkpoint = Checkpoint(
+        checkpoint_of(options.output), identity, (job.sampling.size, job.sampling.size), console.warn
+    )
     started = time.perf_counter()
-    candidates, references = _rendered(options, pairs, materials, setting, checkpoint)
+    candidates, references = _rendered(job, pairs, materials, setting, checkpoint)
     seconds = time.perf_counter() - started
-    comparison = _compared(options, pairs, references, candidates) if references else None
+    comparison = _compared(job, pairs, references, candidates) if references else None
     exposed_as = comparison.reference if comparison else _sheet(candidates)
     scale = exposure(exposed_as.pixels, exposed_as.mask)
-    caption = pairs if SCENES[options.scene].each else []
+    caption = pairs if SCENES[job.scene].each else []
     _write(options.output, candidates, scale, caption)
-    result: dict[str, Any] = {"image": str(options.output), "seconds": seconds, "spp": options.spp}
-    result |= {"variant": mitsuba().variant(), "scene": options.scene, "sampler": options.sampler}
-    result |= {"material": labels[0][1], "materials": [name for _, name in labels], "resumed": checkpoint.resumed}
+    result: dict[str, Any] = {"image": str(options.output), "seconds": seconds, "spp": job.sampling.spp}
+    result |= {"variant": mitsuba().variant(), "scene": job.scene, "sampler": job.sampler}
+    result |= {"material": shown[0]["label"], "resumed": checkpoint.resumed}
     rows: dict[str, str] = {}
     if comparison:
         _write(outputs["reference"], references, scale, caption)
-        names = _held_against(pairs, labels)
+        names = _held_against(shown)
         _write_against(outputs, comparison, names)
         result |= comparison.metrics | {"reference": names[0], "candidate": names[1]}
         result |= {f"{name}_image": str(path) for name, path in outputs.items()}
@@ -151,15 +185,16 @@ def _render(options: Namespace) -> dict[str, Any]:
             rows |= table_rows(tables)
     checkpoint.remove()
     if not options.json:
-        shown = ", ".join(result["materials"][:3]) + (f" and {len(labels) - 3} more" if labels[3:] else "")
-        console.say(f"{shown} → {options.output} ({seconds:.1f} s)")
+        rendered = ", ".join(one["label"] for one in shown[:3]) + (f" and {len(shown) - 3} more" if shown[3:] else "")
+        console.say(f"{rendered} → {options.output} ({seconds:.1f} s)")
         if rows:
             console.print_rows(f"{result['candidate']} against {result['reference']}", rows)
-    return result | {"warnings": warn.told}
+            console.wrote([options.output, *outputs.values()])
+    return answers.of_materials(shown, **result)
 
 
-def _outputs(options: Namespace, pairs: Sequence[Pair]) -> dict[str, Path]:
-    """The files of a comparison, by what they show."""
+def _outputs(options: RenderArguments, pairs: Sequence[Pair]) -> dict[str, Path]:
+    """The files that --against writes beside the render, by what they show. Raises OptionError or OSError."""
     inputs = [*(pair.source for pair in pairs), *options.against, options.envmap, options.mesh]
     check_output(options.output, (".png", ".exr"), *inputs)
     check_apart(checkpoint_of(options.output), *inputs)
@@ -174,106 +209,119 @@ def _outputs(options: Namespace, pairs: Sequence[Pair]) -> dict[str, Path]:
     return paths
 
 
-def _pairs(options: Namespace) -> list[Pair]:
+def _pairs(job: Job) -> list[Pair]:
     """The materials of the scene, in order, each with its reference."""
-    given: list[str] = options.materials
-    kind = SCENES[options.scene]
+    given, against = job.asked.materials, job.asked.against
+    kind = SCENES[job.scene]
     own = kind.materials
     if kind.each:
-        sources = [file for source in given for file in _files(source)] or list(own)
+        sources = expanded(given) or list(own)
     elif len(given) > len(own):
-        raise OptionError(f"materials: expected at most {len(own)} in {options.scene}, found {len(given)}")
+        raise OptionError(f"MATERIAL: expected at most {len(own)} in {job.scene}, found {len(given)}")
     else:
-        sources = given + list(own[len(given) :])
-    if len(options.against) > len(sources):
-        raise OptionError(f"against: expected at most {len(sources)}, found {len(options.against)}")
-    against = options.against + [None] * (len(sources) - len(options.against))
+        sources = [*given, *own[len(given) :]]
+    if len(against) > len(sources):
+        raise OptionError(f"--against: expected at most {len(sources)}, found {len(against)}")
+    references = [*against, *[None] * (len(sources) - len(against))]
     return [
         Pair(source, reference, kind.each or number < len(given))
-        for number, (source, reference) in enumerate(zip(sources, against, strict=True))
+        for number, (source, reference) in enumerate(zip(sources, references, strict=True))
     ]
 
 
-def _files(source: str) -> Iterator[str]:
-    """What a folder stands for."""
-    folder = Path(source)
-    if source in NAMES or not folder.is_dir():
-        yield source
-        return
-    files = sorted(str(path) for path in folder.iterdir() if by_extension(readable(), path) and path.is_file())
-    if not files:
-        raise MaterialError(f"{source}: expected a folder with materials, found none in it")
-    yield from files
+def _read_all(
+    pairs: Sequence[Pair], materials: Materials, job: Job
+) -> tuple[list[Pair], dict[str, str], list[dict[str, Any]]]:
+    """Reads every material once, so that a bad one is found before hours are spent on the others.
 
-
-def _looked_at(
-    pairs: list[Pair], materials: Materials, options: Namespace, warn: Callable[[str], None]
-) -> tuple[list[Pair], dict[str, str], list[tuple[str, str]]]:
-    """Reads every material once, so that bad ones are found before hours are spent on the others.
-
-    Returns the pairs that can be read, what decides their pixels, and how reference and material are called. Raises the
-    error of one that was named itself.
+    Returns the pairs that can be read; by name, hashes of all that decides their pixels; and what is said of each
+    material, see `_described`. A material of a folder or a pattern that cannot be read is left out with a warning; the
+    error of one that was named is raised.
     """
     kept: list[Pair] = []
     identity: dict[str, str] = {}
-    labels: list[tuple[str, str]] = []
+    named: list[tuple[str, str, str]] = []
     for pair in pairs:
         try:
-            reference, brdf = materials.both(pair)
+            both = materials.both(pair)
         except SommerlError as error:
-            in_folder = pair.source not in options.materials and pair.against is None
-            if not in_folder:
+            if pair.against is not None or not pair.given or pair.source in job.asked.materials:
                 raise
-            warn(f"{error}; it is left out")
+            console.warn(f"{error}; it is left out")
             continue
         kept.append(pair)
-        labels.append((label(reference), label(brdf)))
-        identity[f"material {len(kept)}"] = content_of(brdf)
+        named += [(source, brdf.name, brdf.lookup) for source, brdf in zip(pair.sources, both, strict=True)]
+        identity[f"material {len(kept)}"] = content_of(both[1])
         if pair.against is not None:
-            identity[f"reference {len(kept)}"] = content_of(reference)
+            identity[f"reference {len(kept)}"] = content_of(both[0])
     if not kept:
-        raise MaterialError(f"{options.materials[0]}: expected a folder with materials, found none that can be read")
-    pixels = MOST_COMPARED if options.against else MOST_PIXELS
-    if len(kept) * options.size**2 > pixels:
-        most = int((pixels / len(kept)) ** 0.5)
-        raise OptionError(f"size: expected at most {most} for {len(kept)} materials, found {options.size}")
-    return kept, identity, labels
+        raise MaterialError(f"{job.asked.materials[0]}: expected a folder with materials, found none that can be read")
+    _check_pixels(job, len(kept))
+    return kept, identity, _described(kept, named)
 
 
-def _setting(options: Namespace, warn: Callable[[str], None]) -> Setting:
-    taken = SCENES[options.scene]
-    for name, allowed, what in (("mesh", taken.mesh, "objects"), ("envmap", taken.environment, "lights")):
-        if getattr(options, name) and not allowed:
-            raise OptionError(f"{options.scene}: expected no --{name}, since it has {what} of its own, found one")
-    mesh = load_mesh(options.mesh) if options.mesh else None
-    if mesh and mesh.found:
-        warn(mesh.found)
-    return Setting(environment_of(options, warn) if taken.environment else None, mesh)
+def _described(pairs: Sequence[Pair], named: Sequence[tuple[str, str, str]]) -> list[dict[str, Any]]:
+    """What is said of each material: input, name, lookup, label, and the label of its reference, or None.
+
+    named: input, name and lookup of the reference and of the material of each pair, one after the other.
+    """
+    made = labels([source for source, _, _ in named], [name for _, name, _ in named])
+    shown = [f"{label} ({looked_up})" for label, (_, _, looked_up) in zip(made, named, strict=True)]
+    return [
+        dict(zip(("input", "name", "lookup"), one, strict=True))
+        | {"label": label, "reference": reference if pair.against is not None else None}
+        for pair, one, reference, label in zip(pairs, named[1::2], shown[::2], shown[1::2], strict=True)
+    ]
+
+
+def _check_pixels(job: Job, count: int) -> None:
+    """Raises OptionError for a sheet of so many materials that is too large."""
+    pixels = MOST_COMPARED if job.asked.against else MOST_PIXELS
+    if count * job.sampling.size**2 > pixels:
+        most = int((pixels / count) ** 0.5)
+        raise OptionError(f"--size: expected at most {most} for {count} materials, found {job.sampling.size}")
+
+
+def _setting(job: Job) -> Setting:
+    taken = SCENES[job.scene]
+    mesh, envmap = job.asked.mesh, job.asked.envmap
+    for option, value, allowed, what in (
+        ("--mesh", mesh, taken.mesh, "objects"),
+        ("--envmap", envmap, taken.environment, "lights"),
+    ):
+        if value and not allowed:
+            raise OptionError(f"{job.scene}: expected no {option}, since it has {what} of its own, found one")
+    loaded = load_mesh(mesh) if mesh else None
+    if loaded and loaded.found:
+        console.warn(loaded.found)
+    return Setting(environment_of(envmap) if taken.environment else None, loaded)
 
 
 def _rendered(
-    options: Namespace, pairs: list[Pair], materials: Materials, setting: Setting, checkpoint: Checkpoint
+    job: Job, pairs: list[Pair], materials: Materials, setting: Setting, checkpoint: Checkpoint
 ) -> tuple[list[Image], list[Image]]:
-    """The images of the materials, and those of the references, none if there are none: one of a scene, many of a grid.
+    """The images of the materials, and those of the references, or none if there is no reference.
+
+    A scene is one image; a grid has an image for each material.
 
     Both are rendered with the references' samplers and the same seed, hence with the same directions.
     """
-    frames = [[pair] for pair in pairs] if SCENES[options.scene].each else [pairs]
+    frames = [[pair] for pair in pairs] if SCENES[job.scene].each else [pairs]
 
     @lru_cache(maxsize=len(pairs) if len(frames) == 1 else 1)
     def fitted(pair: Pair) -> Sampler:
-        return named.fitted(options.sampler, materials.both(pair)[0])
+        return named.fitted(job.sampler, materials.both(pair)[0])
 
     def make(frame: Sequence[Pair], which: int) -> Scene:
         samplers = [fitted(pair) for pair in frame]
         brdfs = [materials.both(pair)[which] for pair in frame]
         return make_scene(
-            options.scene,
+            job.scene,
             brdfs,
             samplers=samplers,
             environment=setting.environment,
             mesh=setting.mesh,
-            size=options.size,
+            size=job.sampling.size,
         )
 
     compared = [any(pair.against is not None for pair in frame) for frame in frames]
@@ -281,7 +329,8 @@ def _rendered(
     for frame, twice in zip(frames, compared, strict=True):
         makers += [partial(make, frame, which) for which in ((0, 1) if twice else (1,))]
     with goes_on_from(checkpoint) as advance:
-        images = render_all(makers, spp=options.spp, seed=options.seed, progress=advance, checkpoint=checkpoint)
+        spp, seed = job.sampling.spp, job.sampling.seed
+        images = render_all(makers, spp=spp, seed=seed, progress=advance, checkpoint=checkpoint)
     rest = iter(images)
     references: list[Image] = []
     candidates: list[Image] = []
@@ -291,11 +340,9 @@ def _rendered(
     return candidates, references if any(compared) else []
 
 
-def _compared(
-    options: Namespace, pairs: Sequence[Pair], references: Sequence[Image], candidates: Sequence[Image]
-) -> Comparison:
-    """The images of a scene, or those spheres of a grid that have a reference, each without empty places."""
-    if SCENES[options.scene].each:
+def _compared(job: Job, pairs: Sequence[Pair], references: Sequence[Image], candidates: Sequence[Image]) -> Comparison:
+    """Measures how far the candidates are from the references; of a grid, over the spheres that have a reference."""
+    if SCENES[job.scene].each:
         held = [pair.against is not None for pair in pairs]
         references, candidates = (list(compress(images, held)) for images in (references, candidates))
     with console.progress("comparing"):
@@ -303,20 +350,21 @@ def _compared(
     return replace(measured, reference=_sheet(references), candidate=_sheet(candidates))
 
 
-def _held_against(pairs: Sequence[Pair], labels: Sequence[tuple[str, str]]) -> tuple[str, str]:
-    """What the references are called, and what is held against them."""
-    found = [names for pair, names in zip(pairs, labels, strict=True) if pair.against is not None]
-    return ", ".join(reference for reference, _ in found), ", ".join(name for _, name in found)
+def _held_against(shown: Sequence[Mapping[str, Any]]) -> tuple[str, str]:
+    """The labels of the references, and of the materials that are compared with them. shown: of `_described`."""
+    found = [one for one in shown if one["reference"] is not None]
+    return ", ".join(one["reference"] for one in found), ", ".join(one["label"] for one in found)
 
 
 def _sheet(images: Sequence[Image], columns: int = 0) -> Image:
-    """One image of several, in rows, linear."""
+    """One image of several: rows of `columns`, or of as many as `_columns` says; linear."""
     columns = columns or _columns(len(images))
     return Image(tiled([image.pixels for image in images], columns), tiled([image.mask for image in images], columns))
 
 
 def _columns(count: int) -> int:
-    """Of a sheet: at least as many as rows, and with the fewest empty places among those less than twice the root."""
+    """How many columns a sheet of so many images has: no fewer than rows, fewer than twice the square root of the
+    count, and of these the number that leaves the fewest places empty."""
     least = math.ceil(math.sqrt(count))
     return min(range(least, 2 * least), key=lambda columns: (-count % columns, columns))
 
@@ -328,13 +376,14 @@ def _write(path: Path, images: Sequence[Image], scale: float, pairs: Sequence[Pa
         return
     pictures = [to_srgb8(image.pixels * scale) for image in images]
     if len(pairs) == len(images):
-        captions = [stem(pair.source) for pair in pairs]
+        sources = [pair.source for pair in pairs]
+        captions = labels(sources, [stem(source) for source in sources])
         pictures = [captioned(list(zip(captions, pictures, strict=True)), _columns(len(pictures)))]
     write_image(path, pictures[0])
 
 
 def _write_against(outputs: dict[str, Path], comparison: Comparison, names: tuple[str, str]) -> None:
-    """Writes what shows a comparison, but for the render itself and the reference."""
+    """Writes the difference as EXR; or, as PNG, reference, render, difference, FLIP and figures on one sheet."""
     if "difference" in outputs:
         write_image(outputs["difference"], comparison.candidate.pixels - comparison.reference.pixels)
         return
@@ -348,62 +397,3 @@ def _write_against(outputs: dict[str, Path], comparison: Comparison, names: tupl
     notes = [f"{name} {value}" for name, value in image_rows(comparison.metrics).items()]
     columns = len(pictures) if len(pictures) * a.shape[1] <= WIDEST else 2
     write_image(outputs["against"], captioned(list(pictures.items()), columns, notes))
-
-
-def _scenes() -> str:
-    """All scenes, what they show, and their own materials where there are several."""
-    lines: list[str] = []
-    for name, kind in SCENES.items():
-        own = f" ({', '.join(kind.materials)})" if kind.places > 1 else ""
-        lines.append(textwrap.fill(kind.summary + own, 118, initial_indent=f"  {name:12}", subsequent_indent=" " * 14))
-    return "\n".join(lines)
-
-
-def arguments(add: Any) -> None:
-    """Adds the command to the command line."""
-    summary = "Renders materials in a scene, or a scene of your own. PNG is exposed for the objects; EXR is linear."
-    example = """sommerl render nickel.smrl -o nickel.exr
-  sommerl render kitchen.xml -o kitchen.exr --spp 1024 -D wall=nickel.smrl
-  sommerl render --scene statue --mesh buddha.obj blue.smrl --against blue.binary -o blue.png
-  sommerl render --scene grid FOLDER --size 128 -o sheet.png"""
-    parser = command(add, "render", render, summary, example)
-    parser.epilog = f"Scenes:\n{_scenes()}\n\n{FILES}\n\n{render_own.FILES}\n\n{parser.epilog}"
-    parser.add_argument(
-        "materials",
-        nargs="*",
-        metavar="MATERIAL",
-        help="as many as the scene takes, the rest are the scene's own; or SCENE.xml, a scene of your own",
-    )
-    default = DEFAULTS["scene"]
-    parser.add_argument("--scene", choices=[*SCENES], help=f"({default})")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="a .png or .exr file")
-    parser.add_argument(
-        "--against",
-        action="append",
-        default=[],
-        metavar="REFERENCE",
-        help="render the scene with this material in place of the first MATERIAL, too, and say how far the two are "
-        "apart; given again: in place of the second one, and so on",
-    )
-    parser.add_argument(
-        "--mesh", type=Path, metavar="FILE", help="statue: a mesh of triangles, .obj or .ply, y up (a built-in one)"
-    )
-    parser.add_argument(
-        "--lookup",
-        choices=INTERPOLATIONS,
-        help="how materials are looked up (tables: trilinear; with --against: as `compare` does)",
-    )
-    parser.add_argument(
-        "--sampler",
-        choices=[*SAMPLERS],
-        help=f"how directions to the light are drawn; all give the same image, with more or less noise ({OURS.name})",
-    )
-    parser.add_argument(
-        "--variant", metavar="NAME", help="SCENE.xml: of Mitsuba, like scalar_rgb (the fastest there is)"
-    )
-    parser.add_argument(
-        "-D", dest="define", action="append", default=[], metavar="NAME=VALUE",
-        help="SCENE.xml: a value for its parameter $NAME; given again: for another one",
-    )  # fmt: skip
-    rendering_options(parser)
-    parser.set_defaults(spp=None, size=None)  # so that it is known which are given

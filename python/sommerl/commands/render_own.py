@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from argparse import Namespace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +12,16 @@ from ..render import scene_file
 from ..render.checkpoint import Checkpoint, checkpoint_of
 from ..render.llvm import mitsuba
 from ..system.errors import OptionError
-from .checks import MOST_SPP, check_apart, check_output, check_range, goes_on_from
-from .console import Warnings
+from . import answers
+from .arguments import flag, named_as_typed
+from .checks import check_apart, check_output, check_range
+from .console import say, warn
+from .render_arguments import RenderArguments
+from .rendering import LARGEST_SEED, MOST_SPP, goes_on_from
 
 EXTENSION = ".xml"
 WITHOUT = ("scene", "against", "mesh", "envmap", "size", "lookup", "sampler")  # options that a scene file decides
-ONLY = {"variant": "--variant", "define": "-D"}  # options that nothing else has
+ONLY = {"variant": "--variant", "define": "-D"}  # options that nothing else takes
 
 FILES = """Scene files:
   SCENE.xml is a scene of your own in Mitsuba's format, where <bsdf type="sommerl"> with a string `filename` is a
@@ -25,7 +29,7 @@ FILES = """Scene files:
   EXR has all channels of the film; PNG has its colours as they are, without exposure."""
 
 
-def scene_of(options: Namespace) -> Path | None:
+def scene_of(options: RenderArguments) -> Path | None:
     """The scene file that is to be rendered, if it is one. Raises OptionError for options that do not go with it."""
     given = [Path(source) for source in options.materials if Path(source).suffix.lower() == EXTENSION]
     if not given:
@@ -39,19 +43,21 @@ def scene_of(options: Namespace) -> Path | None:
         )
     for name in WITHOUT:
         if getattr(options, name):
-            raise OptionError(f"--{name}: expected no such option beside a scene file, which decides that, found one")
+            raise OptionError(
+                f"{flag(name)}: expected no such option beside a scene file, which decides that, found one"
+            )
     return given[0]
 
 
-def render(path: Path, options: Namespace) -> dict[str, Any]:
+def render(path: Path, options: RenderArguments) -> dict[str, Any]:
     """Renders a scene file."""
-    warn = Warnings()
     parameters = _parameters(options.define)
-    check_range("seed", options.seed, 0, 2**64 - 1)
+    check_range("--seed", options.seed, 0, LARGEST_SEED)
     if options.spp is not None:
-        check_range("spp", options.spp, 1, MOST_SPP)
+        check_range("--spp", options.spp, 1, MOST_SPP)
     check_output(options.output, (".png", ".exr"), path)
-    variant = mitsuba(options.variant).variant()
+    with named_as_typed():
+        variant = mitsuba(options.variant).variant()
     with scene_file.warnings_to(warn):
         scene = scene_file.load(path, parameters)
         spp = scene.samples if options.spp is None else options.spp
@@ -78,13 +84,13 @@ def render(path: Path, options: Namespace) -> dict[str, Any]:
         scene_file.write(options.output, bitmap)
     checkpoint.remove()
     if not options.json:
-        print(f"{path} → {options.output} ({seconds:.1f} s)")
+        say(f"{path} → {options.output} ({seconds:.1f} s)")
     result = {"image": str(options.output), "seconds": seconds, "spp": spp, "variant": variant, "scene": str(path)}
     result |= {"size": list(scene.size), "channels": scene_file.channels_of(bitmap), "files": list(files)}
-    return result | {"resumed": checkpoint.resumed, "warnings": warn.told}
+    return answers.of_materials([], input=str(path), resumed=checkpoint.resumed, **result)
 
 
-def _parameters(definitions: list[str]) -> dict[str, str]:
+def _parameters(definitions: Sequence[str]) -> dict[str, str]:
     """Values by names. Raises OptionError for what is not name=value."""
     found: dict[str, str] = {}
     for definition in definitions:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -10,6 +9,7 @@ from ..models.family import Family
 from ..models.lambertian import LAMBERTIAN
 from ..models.multi_lobe import FAMILIES
 from ..system.errors import OptionError
+from ..system.near import did_you_mean
 
 Loss = Literal["l2", "cosine-l2", "log", "cube-root"]
 Sampling = Literal["sphere", "lattice"]
@@ -61,8 +61,7 @@ class FitOptions:
 def family(model: str) -> Family:
     """The family of a name. Raises OptionError, which lists all names, if there is none of that name."""
     if model not in FAMILIES:
-        nearest = difflib.get_close_matches(model.lower(), FAMILIES, 1)
-        hint = f"; did you mean {nearest[0]}?" if nearest else ""
+        hint = did_you_mean(model, FAMILIES)
         raise OptionError(f"model: expected {', '.join(FAMILIES)} or all, found {model}{hint}")
     return FAMILIES[model]
 

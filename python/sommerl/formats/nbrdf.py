@@ -8,7 +8,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 from ..models.nbrdf import SHAPES, WEIGHTS, NeuralBrdf
 from ..system import door
 from ..system.errors import FormatError, MaterialError
+from ..system.near import did_you_mean
 from ..system.visible import visible
 from . import hdf5
 from .format import Format
@@ -69,8 +69,8 @@ def _npz(path: Path, arrays: Mapping[str, NDArray[Any]], member: str) -> NeuralB
     if not member and len(names) > 1:
         raise FormatError(f"{path}: expected the name of one of its {len(names)} materials, as {path}:{names[0]}")
     if member and member not in names:
-        nearest = difflib.get_close_matches(member, names, 1, 0.0)[0]
-        raise FormatError(f"{path}: expected a material in it, found {member}; did you mean {nearest}?")
+        hint = did_you_mean(member, names) or f"; it has {', '.join(names[:20])}"
+        raise FormatError(f"{path}: expected a material in it, found {member}{hint}")
     chosen = member or names[0]
     return NeuralBrdf.from_flat(_numbers(arrays[chosen]).reshape(-1), name=f"{visible(chosen, LONGEST_NAME)} (NBRDF)")
 

@@ -6,13 +6,12 @@ Each is the Shifted Gamma fit of a material in the MERL database (parameters pub
 
 from __future__ import annotations
 
-import difflib
-
 import numpy as np
 
 from ..reflectance.cells import MERL, Lattice
 from ..reflectance.table import BrdfTable
 from ..system.errors import MaterialError
+from ..system.near import did_you_mean
 from .sgd import PARAMETERS, ShiftedGamma
 
 NAMES = (
@@ -30,10 +29,10 @@ NAMES = (
 
 
 def builtin(name: str) -> ShiftedGamma:
-    """A built-in material, as a formula. Raises MaterialError, with the most similar name, for other names."""
+    """A built-in material, as a formula. Raises MaterialError, with the most similar name or all, for other names."""
     if name not in _FITS:
-        nearest = difflib.get_close_matches(name, NAMES, 1, 0.0)[0]
-        raise MaterialError(f"{name}: expected a file or a built-in material, found neither; did you mean {nearest}?")
+        hint = did_you_mean(name, NAMES) or f"; built-in are {', '.join(NAMES)}"
+        raise MaterialError(f"{name}: expected a file or a built-in material, found neither{hint}")
     return ShiftedGamma(f"{name} (SGD stand-in)", dict(zip(PARAMETERS, _FITS[name], strict=True)))
 
 

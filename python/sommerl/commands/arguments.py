@@ -1,0 +1,167 @@
+"""The arguments of a command as a dataclass: each field is one, of the field's type.
+
+`option` and `positional` say the rest of a field: its help, its default. `add_to` adds the fields to a parser, and
+`read` makes the dataclass of what argparse found: its `Namespace` goes no further than that.
+"""
+
+from __future__ import annotations
+
+import re
+from argparse import ArgumentTypeError, Namespace
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import MISSING, Field, dataclass, field, fields
+from fractions import Fraction
+from typing import Any, Literal, NewType, TypeVar, get_args, get_origin, get_type_hints
+
+from ..system import threads
+from ..system.errors import OptionError
+
+T = TypeVar("T")
+
+Material = NewType("Material", str)  #: as it was given: a file, or the name of a built-in one
+
+UNITS = {"": 1, "b": 1, "kb": 1000, "mb": 1000_000}
+
+
+def option(
+    *short: str,
+    help: str,
+    default: Any = MISSING,
+    metavar: str | None = None,
+    choices: Sequence[str] | None = None,
+    read: Callable[[str], Any] | None = None,
+    instead_of: str | None = None,
+) -> Any:
+    """A field that is an option, --like-its-name; one without a default has to be given.
+
+    short: its other names. choices: those of a `Literal` by themselves. read: what makes a value of the text, where the
+    type does not say it. instead_of: names a group of options of which one may be given.
+    """
+    flags: dict[str, Any] = {"short": short, "help": help, "metavar": metavar, "choices": choices, "read": read}
+    return field(default=default, metadata={**flags, "instead_of": instead_of})
+
+
+def positional(metavar: str, *, help: str, default: Any = MISSING, choices: Sequence[str] | None = None) -> Any:
+    """A field that is an argument without a name; a tuple takes any number, at least one if there is no default."""
+    return field(default=default, metadata={"positional": metavar, "help": help, "choices": choices})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arguments:
+    """What every command can be asked for."""
+
+    json: bool = option(default=False, help="print one JSON object and nothing else (docs/json.md)")
+    threads: str | None = option(
+        default=None,
+        metavar="N",
+        help=f"the most that work at once ({threads.VARIABLE}; if not set, as many as there are processors)",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class WritingArguments(Arguments):
+    """What every command that writes files can be asked for."""
+
+    overwrite: bool = option(default=False, help="replace files that Sommerl did not write, and measurements, too")
+
+
+def flag(name: str) -> str:
+    """An option as it is typed, of the name of its field."""
+    return f"--{name.replace('_', '-')}"
+
+
+@contextmanager
+def named_as_typed() -> Generator[None]:
+    """Within the block, errors of the library name an option as it is typed: "--target-size", not "target_size".
+
+    Only for calls whose OptionErrors all begin with the name of a parameter.
+    """
+    try:
+        yield
+    except OptionError as error:
+        raise OptionError(re.sub(r"^\w+(?=: )", lambda found: flag(found[0]), str(error))) from error
+
+
+def library_options(kind: Callable[..., T], arguments: Arguments) -> T:
+    """The library's options, a dataclass, from the arguments that have the same names. Raises OptionError."""
+    with named_as_typed():
+        return kind(**{each.name: getattr(arguments, each.name) for each in fields(kind)})  # pyright: ignore
+
+
+def add_to(parser: Any, kind: type[Arguments]) -> None:
+    """Adds the fields of a dataclass to a parser."""
+    types = get_type_hints(kind)
+    groups: dict[str, Any] = {}
+    for each in fields(kind):
+        names, settings = _argument(each, types[each.name])
+        group = each.metadata.get("instead_of")
+        if group and group not in groups:
+            groups[group] = parser.add_mutually_exclusive_group()
+        (groups[group] if group else parser).add_argument(*names, **settings)
+
+
+def read(kind: type[T], found: Namespace) -> T:
+    """The dataclass of what argparse found."""
+    values = {each.name: getattr(found, each.name) for each in fields(kind)}  # pyright: ignore
+    return kind(**{name: tuple(value) if isinstance(value, list) else value for name, value in values.items()})  # pyright: ignore
+
+
+def _argument(each: Field[Any], hint: Any) -> tuple[tuple[str, ...], dict[str, Any]]:
+    """What argparse is told of a field: names, and settings."""
+    about: Mapping[str, Any] = each.metadata
+    settings: dict[str, Any] = {"help": about["help"]}
+    if each.default is not MISSING:
+        settings["default"] = each.default
+    several = get_origin(hint) is tuple
+    if hint is bool:
+        return (*about["short"], flag(each.name)), settings | {"action": "store_true"}
+    kind = get_args(hint)[0] if several else _without_none(hint)
+    choices = about["choices"] or (get_args(kind) if get_origin(kind) is Literal else None)
+    if choices:
+        settings["choices"] = choices
+    elif kind is not str:
+        settings["type"] = about.get("read") or READERS.get(kind, kind)
+    if "positional" in about:
+        if several:
+            settings |= {"nargs": "+" if each.default is MISSING else "*"}
+        elif each.default is not MISSING:
+            settings |= {"nargs": "?"}
+        return (each.name,), settings | {"metavar": about["positional"]}
+    if several:
+        settings |= {"action": "append", "default": []}
+    if about["metavar"]:
+        settings["metavar"] = about["metavar"]
+    return (*about["short"], flag(each.name)), settings | {"required": each.default is MISSING}
+
+
+def _without_none(hint: Any) -> Any:
+    """X, of X | None."""
+    kinds = [kind for kind in get_args(hint) if kind is not type(None)]
+    return kinds[0] if get_origin(hint) is not Literal and kinds and type(None) in get_args(hint) else hint
+
+
+def whole_number(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise ArgumentTypeError(f"expected a whole number, found {text}") from None
+
+
+def number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ArgumentTypeError(f"expected a number, found {text}") from None
+
+
+def byte_count(text: str) -> int:
+    """A size, like 8000, 8kB or 2.7 kB; kB = 1000 bytes."""
+    found = re.fullmatch(r"(\d{1,12}(?:\.\d{1,12})?) ?([kM]?B)?", text, re.ASCII | re.IGNORECASE)
+    count = Fraction(found[1]) * UNITS[(found[2] or "").lower()] if found else Fraction(1, 2)
+    if count.denominator != 1:
+        raise ArgumentTypeError(f"expected a number of bytes, like 8000 or 8kB, found {text}")
+    return int(count)
+
+
+READERS: dict[Any, Callable[[str], Any]] = {int: whole_number, float: number}
