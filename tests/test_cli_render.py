@@ -145,7 +145,7 @@ def test_a_mesh_without_normals_renders_and_says_so(capsys, tmp_path):
         (["--scene", "statue", "--mesh", "{}/text.obj"], 1, "text.obj: the mesh has no triangles"),
         (["--scene", "sphere", "--mesh", "{}/mesh.obj"], 2, "sphere: expected no --mesh"),
         (["--scene", "still-life", "--envmap", "{}/light.exr"], 2, "still-life: expected no --envmap"),
-        (["--envmap", "{}/light.png"], 1, "light.png: expected radiance in numbers that go beyond white"),
+        (["--envmap", "{}/light.png"], 1, "light.png: expected an image of high dynamic range"),
         (
             ["--scene", "still-life", "nickel", "nickel", "nickel", "nickel"],
             2,

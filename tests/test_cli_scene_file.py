@@ -315,7 +315,7 @@ def test_mitsuba_warns_on_standard_error_once(capsys, tmp_path, short_passes):
         (None, ["{}/scene.xml", "-D", "width=9", "-D", "width=8"], 2, "-D: expected each name once, found width again"),
         (None, ["{}/scene.xml", "-D", "unused=1"], 1, "(Found unused parameters: $unused=1)"),
         (None, ["{}/scene.xml", "-D", "width=x"], 1, 'could not parse integer value "x"'),
-        (None, ["{}/scene.xml", "-D", "width=1677722"], 1, "film of at most 16777216 pixels, found 1677722 × 10"),
+        (None, ["{}/scene.xml", "-D", "width=1677722"], 1, "the film has 1677722 × 10 pixels, more than 16777216"),
         (None, ["{}/scene.xml", "-D", "material=nickle"], 1, "did you mean nickel"),
         (None, ["{}/scene.xml", "-D", "material=none.smrl"], 1, "none.smrl: there is no such file"),
         (None, ["{}/scene.xml", "-D", "material={}/bad.smrl"], 1, "bad.smrl: expected at least"),

@@ -130,7 +130,7 @@ def test_one_lobe_of_one_term():
 
 
 def test_too_many_terms():
-    with pytest.raises(OptionError, match="terms: expected at most 256 of all lobes, found 1024"):
+    with pytest.raises(OptionError, match="terms: expected at most 256 for all lobes together, found 1024"):
         FactorOptions(32, 32)
     with pytest.raises(MaterialError, match="256 terms"):
         made(32, 9)
@@ -232,11 +232,14 @@ def test_bad_options(name, value):
 def test_bad_factors():
     lobes, rows, columns, scale = arrays(made())
     bad = {
-        "shapes that fit": [(lobes[1:], rows, columns, scale), (lobes, rows[:, :1], columns, scale)],
+        "shapes do not fit": [(lobes[1:], rows, columns, scale), (lobes, rows[:, :1], columns, scale)],
         "from 0 to 1": [(-lobes, rows, columns, scale), (lobes, rows + np.float16(np.nan), columns, scale)],
         "from 0 to 1e\\+30": [(lobes, rows, columns, -scale), (lobes, rows, columns, scale + np.inf)],
     }
-    bad["shapes that fit"] += [(lobes, rows, columns, scale[0]), (lobes[:, :0], rows[:, :0], columns[:, :0], scale[:0])]
+    bad["shapes do not fit"] += [
+        (lobes, rows, columns, scale[0]),
+        (lobes[:, :0], rows[:, :0], columns[:, :0], scale[:0]),
+    ]
     for message, cases in bad.items():
         for case in cases:
             with pytest.raises(MaterialError, match=message):
