@@ -42,6 +42,14 @@ def swept(*arguments):
     return _core.NodePalette(*FIELDS).sweep(*(np.copy(each) for each in BITS), *arguments)
 
 
+def in_cells(*arguments):
+    return _core.CellLookup(*arguments[:5]).eval(*arguments[5:])
+
+
+def on_nodes(*arguments):
+    return _core.NodeLookup(*arguments[:9]).eval(*arguments[9:])
+
+
 # What is called, and arguments that fit.
 CALLS = {
     "learner": (_core.Learner, LEARNER),
@@ -49,13 +57,13 @@ CALLS = {
     "palette": (_core.Palette, [F32, "boxes", "portable", 2]),
     "query": (lambda *triples: _core.Palette(F32, "boxes", None, 2).query(*triples), [F32]),
     "query-all": (lambda *triples: _core.Palette(F32, "all", None, 2).query(*triples), [F32]),
-    "lookup": (_core.lookup, [UP, UP, (2, 2, 2), True, False, RNG.random(24), None, "portable", 2]),
-    "lookup-trilinear": (_core.lookup, [UP, UP, (2, 2, 2), False, True, RNG.random(24), None, "portable", 2]),
-    "lookup-index": (_core.lookup, [UP, UP, (2, 2, 2), True, True, RNG.random(6), np.ones(8, np.uint8), None, 2]),
-    "lookup-index-16": (_core.lookup, [UP, UP, (2, 2, 2), True, False, RNG.random(6), np.ones(8, np.uint16), None, 2]),
+    "lookup": (in_cells, [(2, 2, 2), True, False, RNG.random(24), None, UP, UP, "portable", 2]),
+    "lookup-trilinear": (in_cells, [(2, 2, 2), False, True, RNG.random(24), None, UP, UP, "portable", 2]),
+    "lookup-index": (in_cells, [(2, 2, 2), True, True, RNG.random(6), np.ones(8, np.uint8), UP, UP, None, 2]),
+    "lookup-index-16": (in_cells, [(2, 2, 2), True, False, RNG.random(6), np.ones(8, np.uint16), UP, UP, None, 2]),
     "lookup-nodes": (
-        _core.lookup_nodes,
-        [UP, UP, *MADE.lattice.axes(), MADE.gains, MADE.lut, MADE.gain_index, MADE.index, 1.0, "portable", 2],
+        on_nodes,
+        [*MADE.lattice.axes(), MADE.gains, MADE.lut, MADE.gain_index, MADE.index, 1.0, UP, UP, "portable", 2],
     ),
     "nodes": (_core.NodePalette, FIELDS),
     "encode": (lambda *bits: _core.NodePalette(*FIELDS).encode(*bits), [*BITS, None]),
@@ -168,15 +176,15 @@ def test_the_learner_takes_shares_alone(bad):
 def test_numbers_of_cells_that_overflow():
     for bins in ((2**32, 2**32, 1), (2**63, 2, 1), (2**21, 2**22, 2**21), (2**64 - 1, 1, 1)):
         for values, index in ((np.zeros(0), None), (np.zeros(3), np.zeros(0, np.uint8)), (np.zeros(3), None)):
-            refused(_core.lookup, UP, UP, bins, True, False, values, index)
+            refused(_core.CellLookup, bins, True, False, values, index)
 
 
 def test_no_entry_no_number():
     for index, trilinear in itertools.product(
         (np.full(8, 3, np.uint8), np.full(8, 2**16 - 1, np.uint16)), (False, True)
     ):
-        assert np.isnan(_core.lookup(UP, UP, (2, 2, 2), True, trilinear, np.ones(9), index)).all()
-        assert not np.isnan(_core.lookup(UP, UP, (2, 2, 2), True, trilinear, np.ones(3 * 2**16), index)).any()
+        assert np.isnan(in_cells((2, 2, 2), True, trilinear, np.ones(9), index, UP, UP)).all()
+        assert not np.isnan(in_cells((2, 2, 2), True, trilinear, np.ones(3 * 2**16), index, UP, UP)).any()
 
 
 WITHOUT_THREADS = """
@@ -187,8 +195,9 @@ lut = np.random.default_rng(0).random((300, 3)).astype(np.float32)
 triples = np.random.default_rng(1).random((20000, 3)).astype(np.float32)
 up = np.abs(np.random.default_rng(2).standard_normal((20000, 3)))
 palette = _core.Palette(lut, threads=64)
+prepared = _core.CellLookup((2, 2, 2), True, True, np.arange(24.0))
 def found():
-    values = _core.lookup(up, up, (2, 2, 2), True, True, np.arange(24.0), threads=64)
+    values = prepared.eval(up, up, threads=64)
     return [palette.query(triples).tobytes().hex(), values.tobytes().hex()]
 before = found()
 pages = int(open("/proc/self/statm").read().split()[0])

@@ -30,7 +30,8 @@ def found(brdf, wi, wo, simd, threads):
     index = None if index is None else index.reshape(-1)
     trilinear = brdf.interpolation == "trilinear"
     shape, reciprocal = brdf.lattice.shape, brdf.lattice.reciprocal
-    return _core.lookup(wi, wo, shape, reciprocal, trilinear, values.reshape(-1), index, simd, threads)
+    prepared = _core.CellLookup(shape, reciprocal, trilinear, values.reshape(-1), index)
+    return prepared.eval(wi, wo, simd, threads)
 
 
 def check_agrees(values, brdf, wi, wo):
@@ -92,12 +93,75 @@ def test_shapes():
 
 def test_the_core_refuses_what_does_not_fit():
     wi, values = np.ones((4, 3)), np.ones(3 * 8)
-    fits = (wi, wi, (2, 2, 2), True, False, values)
-    assert _core.lookup(*fits).shape == (4, 3)
-    for position, bad in ((0, wi[:3]), (0, wi[:, :2].copy()), (2, (2, 2, 3)), (2, (0, 2, 2)), (5, values[:-1])):
+    fits = ((2, 2, 2), True, False, values)
+    prepared = _core.CellLookup(*fits)
+    assert prepared.eval(wi, wi).shape == (4, 3)
+    for position, bad in ((0, (2, 2, 3)), (0, (0, 2, 2)), (3, values[:-1]), (3, np.ones(3 * 9)), (3, np.ones(48)[::2])):
         arguments = list(fits)
         arguments[position] = bad
         with pytest.raises(ValueError, match="expected"):
-            _core.lookup(*arguments)
+            _core.CellLookup(*arguments)
+    for bad in (wi[:3], wi[:, :2].copy(), np.ones((3, 4)).T):
+        with pytest.raises(ValueError, match="expected"):
+            prepared.eval(bad, wi)
     with pytest.raises(ValueError, match="simd: expected"):
-        _core.lookup(*fits, None, "mmx")
+        prepared.eval(wi, wi, "mmx")
+
+
+def check_sees_changes(prepare):
+    """A prepared lookup reads its arrays in each call: what their owner writes into them counts."""
+    values, index = np.random.default_rng(0).random(6), np.zeros(8, np.uint8)
+    prepared = prepare((2, 2, 2), True, False, values, index)
+    up = np.array([[0.0, 0.0, 1.0]])
+    assert np.array_equal(prepared.eval(up, up), [values[:3]])
+    values[:3] = 7
+    assert (prepared.eval(up, up) == 7).all()
+    index[:] = 1
+    assert np.array_equal(prepared.eval(up, up), [values[3:]])
+
+
+def test_a_prepared_lookup_sees_changes():
+    check_sees_changes(_core.CellLookup)
+    must_fail(check_sees_changes, lambda *given: _core.CellLookup(*given[:3], *map(np.copy, given[3:])))
+
+
+def retyped(array, dtype):
+    array.dtype = dtype
+
+
+# What the owner of the arrays does to them, and what a lookup then gives: an error, or NaN.
+CHANGES = {
+    "fewer values": (lambda values, _: values.resize(4, refcheck=False), ValueError),
+    "fewer entries": (lambda values, _: values.resize(3, refcheck=False), "NaN"),
+    "other values": (lambda values, _: retyped(values, np.float32), TypeError),
+    "fewer cells": (lambda _, index: index.resize(4, refcheck=False), ValueError),
+    "other index": (lambda _, index: retyped(index, np.uint16 if index.dtype == np.uint8 else np.uint8), ValueError),
+    "other entries": (lambda _, index: index.fill(200), "NaN"),
+}
+
+
+def check_reads_nothing_outside(change, expected, trilinear, dtype):
+    values, index = np.ones(24), np.full(8, 7, dtype)
+    prepared = _core.CellLookup((2, 2, 2), True, trilinear, values, index)
+    assert np.allclose(prepared.eval(*PAIRS), 1)
+    change(values, index)
+    try:
+        result = "numbers" if np.isfinite(prepared.eval(*PAIRS)).any() else "NaN"
+    except (ValueError, TypeError) as error:
+        result = type(error)
+    assert result == expected
+
+
+@pytest.mark.filterwarnings("ignore:Setting the dtype:DeprecationWarning")
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+@pytest.mark.parametrize("trilinear", [False, True])
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_prepared_lookup_reads_nothing_outside_of_arrays_that_changed(change, trilinear, dtype):
+    check_reads_nothing_outside(*CHANGES[change], trilinear, dtype)
+
+
+def test_that_check_notices_what_is_read():
+    must_fail(check_reads_nothing_outside, lambda values, _: values.fill(2), "NaN", False, np.uint8)
+    must_fail(
+        check_reads_nothing_outside, lambda values, _: values.resize(3, refcheck=False), ValueError, False, np.uint8
+    )

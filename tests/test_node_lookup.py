@@ -44,7 +44,7 @@ def in_numpy(lattice):
 
 
 def found(name, wi, wo, simd=None, threads=None):
-    return _core.lookup_nodes(wi, wo, *arguments(LATTICES[name]), simd, threads)
+    return _core.NodeLookup(*arguments(LATTICES[name])).eval(wi, wo, simd, threads)
 
 
 EXPECTED = {name: Brdf.eval(in_numpy(lattice), *PAIRS) for name, lattice in LATTICES.items()}
@@ -69,7 +69,7 @@ def test_that_check_notices_another_node_another_shape_and_another_order():
         (theta_h, band, [[0, 61, 180]], phi_d, gains, shapes, gain, shape, scale),
         (theta_h, band, theta_d, phi_d, gains, shapes, gain, np.roll(shape, 1), scale),
     ):
-        must_fail(check_agrees, _core.lookup_nodes(*PAIRS, *other), EXPECTED["one band"])
+        must_fail(check_agrees, _core.NodeLookup(*other).eval(*PAIRS), EXPECTED["one band"])
     must_fail(check_agrees, found("one band", *PAIRS)[:, ::-1], EXPECTED["one band"])
 
 
@@ -141,8 +141,9 @@ def test_shapes():
 
 
 def refused(wi, wo, *rest):
+    *prepared, simd = rest
     with pytest.raises(ValueError, match="expected"):
-        _core.lookup_nodes(wi, wo, *rest)
+        _core.NodeLookup(*prepared).eval(wi, wo, simd)
 
 
 FITS = (np.ones((4, 3)), np.ones((4, 3)), *arguments(LATTICES["one band"]))
@@ -200,4 +201,35 @@ def test_the_core_refuses_what_does_not_fit(position, bad):
 
 def test_that_check_notices_what_fits():
     with pytest.raises(pytest.fail.Exception):
-        refused(*FITS)
+        refused(*FITS, None)
+
+
+def check_sees_changes(prepare):
+    """A prepared lookup reads its arrays in each call: what their owner writes into them counts."""
+    lattice = LATTICES["one band"]
+    *axes, gains, shapes, gain, shape, scale = arguments(lattice)
+    prepared = prepare(*axes, gains, shapes, gain, shape, scale)
+    for changed in (gains, shapes, gain, shape):
+        changed[:] = np.roll(changed, 1, axis=0)
+        made = FittedTable(lattice, gains[gain][:, None] * shapes[shape], SCALE, name="made up")
+        check_agrees(prepared.eval(*PAIRS), Brdf.eval(made, *PAIRS))
+        check_agrees(prepared.eval(*FEW), Brdf.eval(made, *FEW))
+
+
+def test_a_prepared_lookup_sees_changes():
+    check_sees_changes(_core.NodeLookup)
+    copies = lambda *given: _core.NodeLookup(*given[:4], *map(np.copy, given[4:8]), given[8])  # noqa: E731
+    must_fail(check_sees_changes, copies)
+
+
+@pytest.mark.parametrize("position", [4, 5, 6, 7])
+@pytest.mark.parametrize("pairs", [PAIRS, FEW])
+def test_a_prepared_lookup_reads_nothing_outside_of_arrays_that_changed(pairs, position):
+    fits = [np.copy(each) if 4 <= at < 8 else each for at, each in enumerate(arguments(LATTICES["one band"]))]
+    changed, prepared = fits[position], _core.NodeLookup(*fits)
+    must_fail(check_dark, prepared.eval(*pairs))
+    if position > 5:
+        changed.fill(2**16 - 1)
+        check_dark(prepared.eval(*pairs))
+    changed.resize((0, *changed.shape[1:]), refcheck=False)
+    check_dark(prepared.eval(*pairs))

@@ -47,7 +47,7 @@ WORK = {
     "lookup": (
         "import numpy as np; from sommerl import _core\n"
         "up = np.abs(np.random.default_rng(0).standard_normal((4000000, 3)))",
-        "_core.lookup(up, up, (2, 2, 2), True, True, np.ones(24), threads=3)",
+        "_core.CellLookup((2, 2, 2), True, True, np.ones(24)).eval(up, up, threads=3)",
     ),
     "train": (
         "from sommerl import *; table = builtin_table('nickel')",

@@ -148,41 +148,71 @@ class NodePalette:
     def shapes(self) -> list[list[int]]:
         """(S, 2), codes."""
 
-def lookup(
-    wi: NDArray[np.float64],
-    wo: NDArray[np.float64],
-    bins: tuple[int, int, int],
-    reciprocal: bool,
-    trilinear: bool,
-    values: NDArray[np.float64],
-    index: NDArray[np.uint8] | NDArray[np.uint16] | None = None,
-    simd: str | None = None,
-    threads: int | None = None,
-) -> NDArray[np.float64]:
-    """f_r (n, 3) of pairs of directions (n, 3), as `Brdf.eval` gives it for what is on a lattice.
+class CellLookup:
+    """A material on a lattice of cells, prepared for many calls of `eval`.
 
-    values: flat triples, of the cells, or of a LUT if `index` has its entry for each cell; NaN where the LUT has none.
-    Angles are within 4 ulp of NumPy's, so that a pair on the very edge of a cell may fall on the other side.
+    The arrays are not copied: they are kept alive, and each call reads what they hold at that time.
     """
 
-def lookup_nodes(
-    wi: NDArray[np.float64],
-    wo: NDArray[np.float64],
-    theta_h: list[int],
-    band: list[int],
-    theta_d: list[list[int]],
-    phi_d: list[list[int]],
-    gains: NDArray[np.float64],
-    shapes: NDArray[np.float64],
-    gain: NDArray[np.uint16],
-    shape: NDArray[np.uint16],
-    scale: float,
-    simd: str | None = None,
-    threads: int | None = None,
-) -> NDArray[np.float64]:
-    """f_r (n, 3) of pairs of directions (n, 3), as `Brdf.eval` gives it for a `FittedTable` of such values.
+    def __init__(
+        self,
+        bins: tuple[int, int, int],
+        reciprocal: bool,
+        trilinear: bool,
+        values: NDArray[np.float64],
+        index: NDArray[np.uint8] | NDArray[np.uint16] | None = None,
+    ) -> None:
+        """bins: in θ_h, θ_d and φ_d. values: flat triples, f_r of the cells; or of a LUT if `index` (cells,) holds the
+        entry of each cell. Raises ValueError for what does not fit.
+        """
 
-    theta_h, band, theta_d, phi_d: the fields of the `NodeLattice`. gains (G,), shapes (S, 3), gain (nodes,) and
-    shape (nodes,): y of a node is gains[gain] · shapes[shape]. simd and threads change nothing but the time. Raises
-    ValueError for what does not fit.
+    def eval(
+        self,
+        wi: NDArray[np.float64],
+        wo: NDArray[np.float64],
+        simd: str | None = None,
+        threads: int | None = None,
+    ) -> NDArray[np.float64]:
+        """f_r (n, 3) of pairs of directions (n, 3), as `Brdf.eval` gives it for what is on a lattice.
+
+        NaN where the index of a cell leads outside the LUT. Angles are within 4 ulp of NumPy's, so that a pair on the
+        very edge of a cell may fall on the other side. simd and threads change nothing but the time. Raises ValueError
+        for what does not fit, such as an array that has another length than before.
+        """
+
+class NodeLookup:
+    """A compact material, on a lattice of nodes, prepared for many calls of `eval`.
+
+    The lattice is copied. The arrays are not: they are kept alive, and each call reads what they hold at that time.
     """
+
+    def __init__(
+        self,
+        theta_h: list[int],
+        band: list[int],
+        theta_d: list[list[int]],
+        phi_d: list[list[int]],
+        gains: NDArray[np.float64],
+        shapes: NDArray[np.float64],
+        gain: NDArray[np.uint16],
+        shape: NDArray[np.uint16],
+        scale: float,
+    ) -> None:
+        """theta_h, band, theta_d, phi_d: the fields of the `NodeLattice`. gains (G,), shapes (S, 3), gain (nodes,) and
+        shape (nodes,): y of a node is gains[gain] · shapes[shape]. scale: of the cube-root domain. Raises ValueError
+        for what does not fit.
+        """
+
+    def eval(
+        self,
+        wi: NDArray[np.float64],
+        wo: NDArray[np.float64],
+        simd: str | None = None,
+        threads: int | None = None,
+    ) -> NDArray[np.float64]:
+        """f_r (n, 3) of pairs of directions (n, 3), as `Brdf.eval` gives it for a `FittedTable` of such values.
+
+        0 where the blend contains a node whose gain or shape leads outside its array, which is possible only if an
+        array was changed after `__init__`. simd and threads change nothing but the time. Raises ValueError for
+        directions that do not fit.
+        """

@@ -47,6 +47,12 @@ impl Cells<'_> {
             Cells::Index16(index, _) => index.len(),
         }
     }
+
+    /// Whether the values are triples.
+    pub fn whole(&self) -> bool {
+        let (Cells::Values(values) | Cells::Index8(_, values) | Cells::Index16(_, values)) = self;
+        values.len().is_multiple_of(3)
+    }
 }
 
 /// Writes f_r of each pair (wi, wo) of directions to `out`, on several threads; zeros where one is below the horizon, NaN where

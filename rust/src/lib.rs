@@ -1,6 +1,7 @@
 //! Python bindings of the hot loops. The contracts are in `python/sommerl/_core.pyi`.
 
 mod eval;
+mod lookup;
 mod nearest;
 mod node_lookup;
 mod nodes;
@@ -195,121 +196,6 @@ fn rows<'a, T: numpy::Element>(array: &'a PyReadonlyArray2<T>, name: &str) -> Py
     Ok(array.as_slice()?.as_chunks::<3>().0)
 }
 
-enum Volume<'py> {
-    Index8(PyReadonlyArray1<'py, u8>),
-    Index16(PyReadonlyArray1<'py, u16>),
-    Values,
-}
-
-#[pyfunction]
-#[pyo3(signature = (wi, wo, bins, reciprocal, trilinear, values, index = None, simd = None, threads = None))]
-#[allow(clippy::too_many_arguments)]
-fn lookup<'py>(
-    py: Python<'py>,
-    wi: PyReadonlyArray2<'py, f64>,
-    wo: PyReadonlyArray2<'py, f64>,
-    bins: [usize; 3],
-    reciprocal: bool,
-    trilinear: bool,
-    values: PyReadonlyArray1<'py, f64>,
-    index: Option<Bound<'py, PyAny>>,
-    simd: Option<&str>,
-    threads: Option<usize>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    guarded(|| {
-        let volume = match &index {
-            None => Volume::Values,
-            Some(array) => match array.extract::<PyReadonlyArray1<u8>>() {
-                Ok(index) => Volume::Index8(index),
-                Err(_) => Volume::Index16(array.extract()?),
-            },
-        };
-        let values = line(&values, "values")?;
-        let cells = match &volume {
-            Volume::Values => eval::Cells::Values(values),
-            Volume::Index8(index) => eval::Cells::Index8(line(index, "index")?, values),
-            Volume::Index16(index) => eval::Cells::Index16(line(index, "index")?, values),
-        };
-        let (wi, wo) = (rows(&wi, "wi")?, rows(&wo, "wo")?);
-        let size = bins.iter().try_fold(1, |size: usize, &n| size.checked_mul(n));
-        // Numbers of cells have 32 bits.
-        let whole = values.len() % 3 == 0 && size.is_some_and(|n| 0 < n && n == cells.len() && n < u32::MAX as usize);
-        if wi.len() != wo.len() || !whole {
-            return Err(invalid("expected as many wi as wo, and a value for each cell"));
-        }
-        let material = eval::OnLattice { lattice: eval::Lattice { bins, reciprocal, trilinear }, cells };
-        evaluated(py, wi.len(), simd, threads, |path, threads, out| eval::eval(wi, wo, &material, path, threads, out))
-    })
-}
-
-/// f_r of pairs of directions: a new array that `write` fills.
-fn evaluated<'py>(
-    py: Python<'py>,
-    pairs: usize,
-    simd: Option<&str>,
-    threads: Option<usize>,
-    write: impl FnOnce(Path, usize, &mut [[f64; 3]]) + Send,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (path, threads) = (path_named(simd)?, threads::allowed(py, threads)?);
-    // SAFETY: `write` writes every element. NumPy gives large arrays large pages, which calloc's zeros do not get.
-    let found = unsafe { PyArray2::new(py, [pairs, 3], false) };
-    {
-        let mut out = found.try_readwrite()?;
-        let (rows, _) = out.as_slice_mut()?.as_chunks_mut::<3>();
-        py.detach(|| write(path, threads, rows));
-    }
-    Ok(found)
-}
-
-#[pyfunction]
-#[pyo3(signature = (wi, wo, theta_h, band, theta_d, phi_d, gains, shapes, gain, shape, scale, simd = None, threads = None))]
-#[allow(clippy::too_many_arguments)]
-fn lookup_nodes<'py>(
-    py: Python<'py>,
-    wi: PyReadonlyArray2<'py, f64>,
-    wo: PyReadonlyArray2<'py, f64>,
-    theta_h: Bound<'py, PyAny>,
-    band: Bound<'py, PyAny>,
-    theta_d: Bound<'py, PyAny>,
-    phi_d: Bound<'py, PyAny>,
-    gains: PyReadonlyArray1<'py, f64>,
-    shapes: PyReadonlyArray2<'py, f64>,
-    gain: PyReadonlyArray1<'py, u16>,
-    shape: PyReadonlyArray1<'py, u16>,
-    scale: f64,
-    simd: Option<&str>,
-    threads: Option<usize>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    guarded(|| {
-        let (wi, wo) = (rows(&wi, "wi")?, rows(&wo, "wo")?);
-        let nodes = node_lookup::Nodes::new(
-            &small_numbers::<Vec<u8>>(&theta_h, "theta_h")?,
-            &small_numbers::<Vec<u8>>(&band, "band")?,
-            &small_numbers::<Vec<Vec<u8>>>(&theta_d, "theta_d")?,
-            &small_numbers::<Vec<Vec<u8>>>(&phi_d, "phi_d")?,
-        )
-        .ok_or_else(|| invalid("nodes: expected axes that increase from 0 to 180, and a band for each row"))?;
-        let factors = node_lookup::Factors {
-            gains: line(&gains, "gains")?,
-            shapes: rows(&shapes, "shapes")?,
-            gain: line(&gain, "gain")?,
-            shape: line(&shape, "shape")?,
-        };
-        if wi.len() != wo.len() || !factors.fit(nodes.size) || !scale.is_finite() {
-            return Err(invalid("expected as many wi as wo, and a finite gain, shape and scale for each node"));
-        }
-        evaluated(py, wi.len(), simd, threads, |path, threads, out| {
-            let material = node_lookup::OnNodes::new(&nodes, factors, scale, wi.len());
-            eval::eval(wi, wo, &material, path, threads, out)
-        })
-    })
-}
-
-/// Whole numbers of a byte each, or lists of such.
-fn small_numbers<'py, T: FromPyObjectOwned<'py>>(numbers: &Bound<'py, PyAny>, name: &str) -> PyResult<T> {
-    numbers.extract().map_err(|_| invalid(format!("{name}: expected whole numbers from 0 to 180")))
-}
-
 /// Numbers that lie one after the other.
 fn line<'a, T: numpy::Element>(array: &'a PyReadonlyArray1<T>, name: &str) -> PyResult<&'a [T]> {
     array.as_slice().map_err(|_| invalid(format!("{name}: expected numbers in one piece")))
@@ -327,8 +213,8 @@ fn _core(module: &Bound<PyModule>) -> PyResult<()> {
     module.add("EMPTY", train::EMPTY)?;
     module.add_class::<Learner>()?;
     module.add_class::<Palette>()?;
+    module.add_class::<lookup::CellLookup>()?;
+    module.add_class::<lookup::NodeLookup>()?;
     module.add_class::<nodes::python::NodePalette>()?;
-    module.add_function(wrap_pyfunction!(lookup, module)?)?;
-    module.add_function(wrap_pyfunction!(lookup_nodes, module)?)?;
     module.add_function(wrap_pyfunction!(simd_paths, module)?)
 }

@@ -123,7 +123,7 @@ fn steps(axis: &[u8], number: impl Fn(usize) -> u32) -> Axis {
     })
 }
 
-/// y of the nodes: the product of a gain and a shape each.
+/// y of the nodes: the product of a gain and a shape each. NaN where an index leads outside.
 pub struct Factors<'a> {
     pub gains: &'a [f64],
     pub shapes: &'a [[f64; 3]],
@@ -144,9 +144,16 @@ impl Factors<'_> {
 
     #[inline(always)]
     fn value(&self, node: usize) -> [f64; 4] {
-        let (gain, shape) = (self.gains[self.gain[node] as usize], &self.shapes[self.shape[node] as usize]);
-        [gain * shape[0], gain * shape[1], gain * shape[2], 0.0]
+        match (entry(self.gains, self.gain, node), entry(self.shapes, self.shape, node)) {
+            (Some(gain), Some(shape)) => [gain * shape[0], gain * shape[1], gain * shape[2], 0.0],
+            _ => [f64::NAN; 4],
+        }
     }
+}
+
+#[inline(always)]
+fn entry<'a, T>(entries: &'a [T], index: &[u16], node: usize) -> Option<&'a T> {
+    index.get(node).and_then(|&number| entries.get(number as usize))
 }
 
 /// A material on nodes.

@@ -166,9 +166,9 @@ class SomManBrdf(OnLattice):
     def _found(self, wi: NDArray[np.float64], wo: NDArray[np.float64]) -> NDArray[np.float64]:
         if not isinstance(self.lattice, NodeLattice):
             return super()._found(wi, wo)
-        return _core.lookup_nodes(
-            wi, wo, *self.lattice.axes(), self.gains, self.lut, self.gain_index, self._index, self.scale
-        )
+        return _core.NodeLookup(
+            *self.lattice.axes(), self.gains, self.lut, self.gain_index, self._index, self.scale
+        ).eval(wi, wo)
 
     def _interpolate(self, interpolation: Interpolation) -> None:
         if isinstance(self.lattice, NodeLattice) and checked(interpolation) != "trilinear":

@@ -107,15 +107,13 @@ class OnLattice(Brdf):
         """f_r of pairs of shape (n, 3)."""
         index, values = self.cells()
         lattice = self.grid or MERL
-        return _core.lookup(
-            wi,
-            wo,
+        return _core.CellLookup(
             lattice.shape,
             lattice.reciprocal,
             self.interpolation == "trilinear",
             values.reshape(-1),
             None if index is None else index.reshape(-1),
-        )
+        ).eval(wi, wo)
 
     @property
     @abstractmethod
