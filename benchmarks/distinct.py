@@ -38,7 +38,7 @@ RULES = (("kohonen", 0.02), ("paper", 0.5))
 class Watched:
     """The core, whose last learner is kept."""
 
-    Palette = _core.Palette
+    Quantiser = _core.Quantiser
     learner: Any
 
     def Learner(self, *arguments: Any, **options: Any) -> Any:

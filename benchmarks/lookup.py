@@ -33,9 +33,9 @@ def query(table: Any, rounds: int) -> dict[str, Any]:
     material, _ = train(table, TrainOptions(clusters=1000, epochs=5))
     lut = (material.lut / scale).astype(np.float32)
     contestants = {
-        "boxes, 1 thread": lambda: _core.Palette(lut, "boxes", None, 1).query(x),
-        "all entries, SIMD, 1 thread": lambda: _core.Palette(lut, "all", None, 1).query(x),
-        "boxes, 2 threads": lambda: _core.Palette(lut, "boxes", None, 2).query(x),
+        "boxes, 1 thread": lambda: _core.Quantiser(lut, "boxes", None, 1).query(x),
+        "all entries, SIMD, 1 thread": lambda: _core.Quantiser(lut, "all", None, 1).query(x),
+        "boxes, 2 threads": lambda: _core.Quantiser(lut, "boxes", None, 2).query(x),
     }
     seconds = interleaved(contestants, rounds)
     return {

@@ -54,9 +54,9 @@ def on_nodes(*arguments):
 CALLS = {
     "learner": (_core.Learner, LEARNER),
     "present": (presented, PRESENT),
-    "palette": (_core.Palette, [F32, "boxes", "portable", 2]),
-    "query": (lambda *triples: _core.Palette(F32, "boxes", None, 2).query(*triples), [F32]),
-    "query-all": (lambda *triples: _core.Palette(F32, "all", None, 2).query(*triples), [F32]),
+    "quantiser": (_core.Quantiser, [F32, "boxes", "portable", 2]),
+    "query": (lambda *triples: _core.Quantiser(F32, "boxes", None, 2).query(*triples), [F32]),
+    "query-all": (lambda *triples: _core.Quantiser(F32, "all", None, 2).query(*triples), [F32]),
     "lookup": (in_cells, [(2, 2, 2), True, False, RNG.random(24), None, UP, UP, "portable", 2]),
     "lookup-trilinear": (in_cells, [(2, 2, 2), False, True, RNG.random(24), None, UP, UP, "portable", 2]),
     "lookup-index": (in_cells, [(2, 2, 2), True, True, RNG.random(6), np.ones(8, np.uint8), UP, UP, None, 2]),
@@ -169,8 +169,8 @@ def test_the_learner_takes_shares_alone(bad):
     assert "alpha" in refused(presented, 0, 40, bad, np.ones(1, np.float32))
     assert "falloff" in refused(presented, 0, 40, 0.5, np.array([1, bad], np.float32))
     if not np.isfinite(bad):
-        assert "lut" in refused(_core.Palette, wrong)
-        assert "triples" in refused(_core.Palette(F32).query, wrong)
+        assert "lut" in refused(_core.Quantiser, wrong)
+        assert "triples" in refused(_core.Quantiser(F32).query, wrong)
 
 
 def test_numbers_of_cells_that_overflow():
@@ -197,7 +197,7 @@ up = np.abs(np.random.default_rng(2).standard_normal((20000, 3)))
 prepared = _core.CellLookup((2, 2, 2), True, True, np.arange(24.0))
 def found(threads):
     values = prepared.eval(up, up, threads=threads)
-    return [_core.Palette(lut, threads=threads).query(triples).tobytes().hex(), values.tobytes().hex()]
+    return [_core.Quantiser(lut, threads=threads).query(triples).tobytes().hex(), values.tobytes().hex()]
 before = found(1)  # of threads that ended, the system keeps the stacks for others
 pages = int(open("/proc/self/statm").read().split()[0])
 if sys.argv[1] == "few":  # not even the stack of another thread

@@ -53,8 +53,8 @@ class Learner:
     def stored_cells(self) -> NDArray[np.uint32]:
         """(M, STORED): the cells whose triples each unit stores; EMPTY where it stores none."""
 
-class Palette:
-    """The LUT, asked for the nearest of its entries (phase 3)."""
+class Quantiser:
+    """A vector quantiser: the LUT, asked for the nearest of its entries (phase 3)."""
 
     def __init__(
         self,
@@ -71,7 +71,7 @@ class Palette:
 class NodePalette:
     """The lattice and the palette of a compact material: its stream of bits, and which entries its nodes get.
 
-    docs/format.md says what the bits mean; `som_man/reference_codec.py` reads them in plain Python.
+    docs/format.md says what the bits mean; `compression/smrl/reference_codec.py` reads them in plain Python.
     """
 
     def __init__(
@@ -84,7 +84,8 @@ class NodePalette:
         shapes: list[list[int]],
     ) -> None:
         """theta_h, band, theta_d, phi_d: the fields of the `NodeLattice`; bands in order, at most 16, and 2¹⁷ nodes.
-        gains (G,) and shapes (S, 2): codes (`som_man.codes`) in order, at most 1024 each. Raises ValueError for others.
+        gains (G,) and shapes (S, 2): codes (`compression.smrl.codes`) in order, at most 1024 each. Raises ValueError
+        for others.
         """
 
     @staticmethod

@@ -42,7 +42,7 @@ def learnt(source, options, kernels=_core):
     kept = []
 
     class Recorded:
-        Palette = kernels.Palette
+        Quantiser = kernels.Quantiser
 
         @staticmethod
         def Learner(*arguments, **options):

@@ -83,7 +83,7 @@ def test_training_stops_there_and_the_report_does_not_show_it(monkeypatch):
     seen = []
 
     class Kernels:
-        Palette = _core.Palette
+        Quantiser = _core.Quantiser
 
         class Learner(_core.Learner):
             def settled(self):
@@ -104,8 +104,8 @@ def test_training_stops_there_and_the_report_does_not_show_it(monkeypatch):
     assert np.array_equal(one.lut, other.lut)
 
 
-def check_query(palette, triples, lut):
-    assert np.array_equal(palette.query(triples), reference.Palette(lut).query(triples))
+def check_query(quantiser, triples, lut):
+    assert np.array_equal(quantiser.query(triples), reference.Quantiser(lut).query(triples))
 
 
 @pytest.mark.parametrize(("search", "simd"), [each for each in SEARCHES if each[0] != "scalar"])
@@ -115,16 +115,16 @@ def test_query(search, simd, entries, threads):
     rng = np.random.default_rng(entries)
     lut = (rng.integers(0, 12, (entries, 3)) / 16).astype(np.float32)  # many alike, many at equal distances
     triples = (rng.integers(0, 24, (2000, 3)) / 32).astype(np.float32)
-    palette = _core.Palette(lut, search, simd, threads)
-    check_query(palette, triples, lut)
-    check_query(palette, triples[:1], lut)
-    assert len(palette.query(triples[:0])) == 0
+    quantiser = _core.Quantiser(lut, search, simd, threads)
+    check_query(quantiser, triples, lut)
+    check_query(quantiser, triples[:1], lut)
+    assert len(quantiser.query(triples[:0])) == 0
 
 
 def test_that_check_notices_the_higher_of_two_alike():
     lut = np.full((40, 3), 0.25, np.float32)
 
-    class Higher(_core.Palette):
+    class Higher(_core.Quantiser):
         def query(self, triples):
             return 39 - super().query(triples)
 

@@ -21,7 +21,7 @@ def trace(kernels, table, options):
 
     class Recorded:
         EMPTY = kernels.EMPTY
-        Palette = kernels.Palette
+        Quantiser = kernels.Quantiser
 
         class Learner:
             def __new__(cls, *arguments, **options):
@@ -79,7 +79,7 @@ def test_that_check_notices_the_smallest_faults(small_table, fault):
     class Kernels:
         EMPTY = reference.EMPTY
         Learner = Broken
-        Palette = reference.Palette
+        Quantiser = reference.Quantiser
 
     must_fail(check_same_bits, Kernels, small_table, TrainOptions(clusters=16, epochs=3, alpha=0.5))
 
@@ -99,10 +99,10 @@ def test_one_step_by_hand():
 def test_ties_go_to_the_lowest_unit():
     x = np.array([[0.5, 0.0, 0.0]], np.float32)
     lut = np.array([[1.0, 0, 0], [0.0, 0, 0]] * 20, np.float32)
-    assert reference.Palette(lut).query(x).tolist() == [0]
+    assert reference.Quantiser(lut).query(x).tolist() == [0]
     for search, simd in itertools.product(("boxes", "all"), _core.simd_paths()):
-        assert _core.Palette(lut, search, simd).query(x).tolist() == [0]
-        assert _core.Palette(lut[1:], search, simd).query(x).tolist() == [0]
+        assert _core.Quantiser(lut, search, simd).query(x).tolist() == [0]
+        assert _core.Quantiser(lut[1:], search, simd).query(x).tolist() == [0]
 
 
 def test_lut_holds_originals_and_every_cell_its_nearest(small_table):
@@ -187,13 +187,13 @@ def test_no_call_into_the_core_takes_long(small_table, monkeypatch):
                 counts.append((stop - start) * 16)
                 return super().present(start, stop, alpha, falloff)
 
-        class Palette:
+        class Quantiser:
             def __init__(self, lut):
-                self.entries, self.palette = len(lut), _core.Palette(lut)
+                self.entries, self.quantiser = len(lut), _core.Quantiser(lut)
 
             def query(self, triples):
                 counts.append(len(triples) * self.entries)
-                return self.palette.query(triples)
+                return self.quantiser.query(triples)
 
     options = TrainOptions(clusters=16, epochs=2)
     material, _ = train(small_table, options, kernels=Kernels)
@@ -257,4 +257,4 @@ def test_the_core_refuses_what_would_read_outside():
             _core.Learner(*arguments)
     for arguments in ((x[:0],), (x[:, :2],), (x, "scalar"), (x, "boxes", "sse9")):
         with pytest.raises(ValueError, match="expected"):
-            _core.Palette(*arguments)
+            _core.Quantiser(*arguments)

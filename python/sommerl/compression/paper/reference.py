@@ -93,7 +93,7 @@ class Learner:
         return self._stored.copy()
 
 
-class Palette:
+class Quantiser:
     """The LUT, asked for the nearest of its entries (phase 3)."""
 
     def __init__(self, lut: F32) -> None:

@@ -67,8 +67,8 @@ def train(
     # By brightness: like entries get like numbers, which makes the index smooth and its file small.
     cells = cells[np.argsort((rgb[cells, 0] + rgb[cells, 1]) + rgb[cells, 2], kind="stable")]
     index = np.zeros(table.lattice.shape, np.uint8 if len(cells) <= 256 else np.uint16)
-    palette = kernels.Palette(x[cells])
-    index[above] = np.concatenate([palette.query(x[start:stop]) for start, stop in _calls(len(x), len(cells))])
+    quantiser = kernels.Quantiser(x[cells])
+    index[above] = np.concatenate([quantiser.query(x[start:stop]) for start, stop in _calls(len(x), len(cells))])
     material = SomManBrdf(
         rgb[cells],
         index,

@@ -1,31 +1,35 @@
-//! Which gain and which shape each node gets: the best of what they cost in error and in bits, node by node, where each node
-//! sees what was left over by its neighbours.
+//! Chooses the gain and the shape of each node, one node after the other: those that cost the least in error and bits, given
+//! what the other nodes have at that time.
 
-use super::model::Model;
-use super::range::bits_of;
-use super::{Axes, Palette};
+use sommerl_codec::{Model, NodeLattice, Palette, bits_of};
 
 /// Half the error is zᵀHz/2 − bᵀz for each of r, g and b: H sparse, by rows.
 pub struct Quadratic<'a> {
+    /// Where each row of H starts in `columns` and `values`, and where the last one ends.
     pub starts: &'a [i32],
+    /// The columns of H's numbers.
     pub columns: &'a [i32],
+    /// H's numbers.
     pub values: &'a [f64],
+    /// b.
     pub right: &'a [[f64; 3]],
 }
 
 /// What the codes of a palette stand for.
 pub struct Values<'a> {
+    /// One for each gain.
     pub gains: &'a [f64],
+    /// One for each shape.
     pub shapes: &'a [[f64; 3]],
 }
 
-/// Turns between gain and shape; more change nothing.
+/// How often gain and shape are chosen in turn. More changes nothing.
 const TURNS: usize = 3;
 
-/// One sweep over all nodes in the order of the stream. Returns the bits of the indices. price: of a bit, as error; if None,
-/// nothing changes.
+/// One sweep over all nodes in the order of the stream. Returns the bits of the indices. price: the error that a bit is worth; if
+/// None, no node changes. Panics if sizes do not fit.
 pub fn sweep(
-    axes: &Axes,
+    lattice: &NodeLattice,
     palette: &Palette,
     values: &Values,
     quadratic: &Quadratic,
@@ -36,13 +40,13 @@ pub fn sweep(
     let Values { gains, shapes } = *values;
     let value = |g: u16, s: u16| shapes[s as usize].map(|x| gains[g as usize] * x);
     let mut z: Vec<[f64; 3]> = gain.iter().zip(shape.iter()).map(|(&g, &s)| value(g, s)).collect();
-    let mut model = Model::new(axes, palette);
+    let mut model = Model::new(lattice, palette);
     let (mut gain_bits, mut shape_bits) = (vec![0.0; gains.len()], vec![0.0; shapes.len()]);
     let (mut i, mut bits) = (0, 0.0);
-    for row in 0..axes.band.len() {
+    for row in 0..lattice.band.len() {
         model.begin(row);
-        let width = axes.width(row);
-        for at in 0..axes.nodes_in(row) {
+        let width = lattice.width(row);
+        for at in 0..lattice.nodes_in(row) {
             model.expect(at / width, at % width);
             costs(model.gain_weights(), &mut gain_bits);
             costs(model.shape_weights(), &mut shape_bits);
@@ -63,7 +67,18 @@ pub fn sweep(
 }
 
 impl Quadratic<'_> {
-    /// Where the error is least if the other nodes stay, and how steeply it grows from there.
+    /// Whether H is a square matrix with so many rows, and b has as many.
+    pub fn fits(&self, nodes: usize) -> bool {
+        let Quadratic { starts, columns, values, right } = self;
+        starts.len() == nodes + 1
+            && starts[0] >= 0
+            && starts.is_sorted()
+            && starts[nodes] as usize <= columns.len().min(values.len())
+            && columns.iter().all(|&column| usize::try_from(column).is_ok_and(|column| column < nodes))
+            && right.len() == nodes
+    }
+
+    /// The value of node i at which the error is least if the other nodes stay; and half the error's second derivative there.
     fn wanted(&self, i: usize, z: &[[f64; 3]]) -> ([f64; 3], f64) {
         let (mut target, mut weight) = (self.right[i], 1e-30);
         for k in self.starts[i] as usize..self.starts[i + 1] as usize {

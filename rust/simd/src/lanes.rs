@@ -1,32 +1,47 @@
-//! Sixteen 32-bit floats at a time, on whatever the processor has. All ways give the same bits.
+//! Sixteen 32-bit floats at a time. Every implementation gives the same bits.
 
-/// A line of sixteen numbers, aligned as every processor likes it.
+/// Sixteen numbers, aligned for the widest vectors.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
-pub struct Line(pub [f32; 16]);
+pub struct Line(
+    /// The numbers.
+    pub [f32; 16],
+);
 
-/// Operations on sixteen lanes. Comparisons give a bit for each lane.
+/// Operations on sixteen lanes. A comparison gives sixteen bits, the lowest for the first lane.
 ///
 /// # Safety
-/// Functions of an implementation may be called only where the processor has what it needs, and are fast only when inlined
-/// into functions that are compiled for it.
+/// An implementation uses no instructions but those of its instruction set. Its functions may be called only on a processor that
+/// has these, and are fast only where they are inlined into a function that is compiled for them.
+#[allow(clippy::missing_safety_doc)] // of each function: the trait's
 pub unsafe trait Simd {
+    /// The sixteen lanes in registers.
     type V: Copy;
+    /// `x` in each lane.
     unsafe fn splat(x: f32) -> Self::V;
+    /// The numbers of a line.
     unsafe fn load(line: &Line) -> Self::V;
+    /// a + b.
     unsafe fn add(a: Self::V, b: Self::V) -> Self::V;
+    /// a − b.
     unsafe fn sub(a: Self::V, b: Self::V) -> Self::V;
+    /// a · b.
     unsafe fn mul(a: Self::V, b: Self::V) -> Self::V;
+    /// The smaller of each two; of `b` where one is NaN.
     unsafe fn min(a: Self::V, b: Self::V) -> Self::V;
+    /// The larger of each two; of `b` where one is NaN.
     unsafe fn max(a: Self::V, b: Self::V) -> Self::V;
+    /// Where a ≤ b.
     unsafe fn le(a: Self::V, b: Self::V) -> u32;
     /// Lanes of `x` where a < b, of `y` elsewhere.
     unsafe fn select_lt(a: Self::V, b: Self::V, x: Self::V, y: Self::V) -> Self::V;
+    /// The lanes as a line.
     unsafe fn store(v: Self::V) -> Line;
+    /// The smallest of all lanes, none of which is NaN.
     unsafe fn smallest(v: Self::V) -> f32;
 }
 
-/// Plain loops over lanes, which compilers turn into whatever vectors there are (SSE2, NEON …).
+/// Plain loops over lanes, which the compiler turns into vectors of what every processor of the target has (SSE2, NEON …).
 pub struct Portable;
 
 #[inline(always)]
@@ -90,6 +105,7 @@ mod x86 {
     use super::{Line, Simd};
     use std::arch::x86_64::*;
 
+    /// One AVX-512 register.
     pub struct Avx512;
 
     unsafe impl Simd for Avx512 {
@@ -142,6 +158,7 @@ mod x86 {
         }
     }
 
+    /// Two AVX2 registers.
     pub struct Avx2;
 
     unsafe impl Simd for Avx2 {
@@ -211,37 +228,5 @@ mod x86 {
                 _mm_cvtss_f32(_mm_min_ss(two, _mm_shuffle_ps::<1>(two, two)))
             }
         }
-    }
-}
-
-/// What to compile for and to run on.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub enum Path {
-    Portable,
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
-}
-
-impl Path {
-    /// The ways that this processor has, slowest first.
-    pub fn available() -> Vec<(&'static str, Path)> {
-        #[cfg_attr(not(target_arch = "x86_64"), allow(unused_mut))]
-        let mut paths = vec![("portable", Path::Portable)];
-        #[cfg(target_arch = "x86_64")]
-        {
-            if std::is_x86_feature_detected!("avx2") {
-                paths.push(("avx2", Path::Avx2));
-            }
-            // The last two for `eval`: the first processors with AVX-512 lack them.
-            if std::is_x86_feature_detected!("avx512f")
-                && std::is_x86_feature_detected!("avx512dq")
-                && std::is_x86_feature_detected!("avx512vl")
-            {
-                paths.push(("avx512", Path::Avx512));
-            }
-        }
-        paths
     }
 }

@@ -8,14 +8,17 @@
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::eval::{self, Material};
-use crate::node_lookup::{Factors, Nodes, OnNodes};
-use crate::{guarded, invalid, line, path_named, rows, threads};
+use sommerl_codec::NodeLattice;
+use sommerl_kernels::{CellLattice, CellMaterial, Cells, Factors, Material, NodeMaterial, NodeSteps, eval};
+
+use crate::convert::{instruction_set, invalid, line, rows};
+use crate::guarded;
+use crate::threads::allowed;
 
 /// A material on cells.
 #[pyclass(frozen)]
 pub struct CellLookup {
-    lattice: eval::Lattice,
+    lattice: CellLattice,
     values: Py<PyAny>,
     index: Option<Py<PyAny>>,
 }
@@ -33,7 +36,7 @@ impl CellLookup {
         index: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
         guarded(|| {
-            let lattice = eval::Lattice { bins, reciprocal, trilinear };
+            let lattice = CellLattice { bins, reciprocal, trilinear };
             let made = CellLookup { lattice, values, index };
             made.with_material(py, |_| Ok(()))?;
             Ok(made)
@@ -58,33 +61,33 @@ impl CellLookup {
 
 impl CellLookup {
     /// Hands over the material as its arrays are now.
-    fn with_material<T>(&self, py: Python, work: impl FnOnce(eval::OnLattice) -> PyResult<T>) -> PyResult<T> {
+    fn with_material<T>(&self, py: Python, work: impl FnOnce(CellMaterial) -> PyResult<T>) -> PyResult<T> {
         let values: PyReadonlyArray1<f64> = self.values.extract(py)?;
         let values = line(&values, "values")?;
         let Some(index) = &self.index else {
-            return work(self.material(eval::Cells::Values(values))?);
+            return work(self.material(Cells::Values(values))?);
         };
         if let Ok(index) = index.extract::<PyReadonlyArray1<u8>>(py) {
-            return work(self.material(eval::Cells::Index8(line(&index, "index")?, values))?);
+            return work(self.material(Cells::Index8(line(&index, "index")?, values))?);
         }
         let index: PyReadonlyArray1<u16> = index.extract(py)?;
-        work(self.material(eval::Cells::Index16(line(&index, "index")?, values))?)
+        work(self.material(Cells::Index16(line(&index, "index")?, values))?)
     }
 
-    fn material<'a>(&self, cells: eval::Cells<'a>) -> PyResult<eval::OnLattice<'a>> {
+    fn material<'a>(&self, cells: Cells<'a>) -> PyResult<CellMaterial<'a>> {
         let size = self.lattice.bins.iter().try_fold(1, |size: usize, &n| size.checked_mul(n));
         // Numbers of cells have 32 bits.
-        if !cells.whole() || !size.is_some_and(|n| 0 < n && n == cells.len() && n < u32::MAX as usize) {
+        if !cells.are_triples() || !size.is_some_and(|n| 0 < n && n == cells.len() && n < u32::MAX as usize) {
             return Err(invalid("expected triples of values, and as many cells as bins"));
         }
-        Ok(eval::OnLattice { lattice: self.lattice, cells })
+        Ok(CellMaterial { lattice: self.lattice, cells })
     }
 }
 
 /// A material on nodes.
 #[pyclass(frozen)]
 pub struct NodeLookup {
-    nodes: Nodes,
+    steps: NodeSteps,
     gains: Py<PyAny>,
     shapes: Py<PyAny>,
     gain: Py<PyAny>,
@@ -109,15 +112,16 @@ impl NodeLookup {
         scale: f64,
     ) -> PyResult<Self> {
         guarded(|| {
-            let nodes = Nodes::new(
-                &small_numbers::<Vec<u8>>(&theta_h, "theta_h")?,
-                &small_numbers::<Vec<u8>>(&band, "band")?,
-                &small_numbers::<Vec<Vec<u8>>>(&theta_d, "theta_d")?,
-                &small_numbers::<Vec<Vec<u8>>>(&phi_d, "phi_d")?,
-            )
-            .ok_or_else(|| invalid("nodes: expected axes that increase from 0 to 180, and a band for each row"))?;
-            let made = NodeLookup { nodes, gains, shapes, gain, shape, scale };
-            let fits = made.with_factors(py, |factors| Ok(factors.fit(made.nodes.size)))?;
+            let lattice = NodeLattice {
+                theta_h: small_numbers(&theta_h, "theta_h")?,
+                band: small_numbers(&band, "band")?,
+                theta_d: small_numbers(&theta_d, "theta_d")?,
+                phi_d: small_numbers(&phi_d, "phi_d")?,
+            };
+            let steps = NodeSteps::new(&lattice)
+                .ok_or_else(|| invalid("nodes: expected axes that increase from 0 to 180, and a band for each row"))?;
+            let made = NodeLookup { steps, gains, shapes, gain, shape, scale };
+            let fits = made.with_factors(py, |factors| Ok(factors.fit(made.steps.nodes())))?;
             if !fits || !scale.is_finite() {
                 return Err(invalid("expected a finite gain, shape and scale for each node"));
             }
@@ -137,7 +141,7 @@ impl NodeLookup {
         guarded(|| {
             let pairs = Pairs::new(&wi, &wo)?;
             self.with_factors(py, |factors| {
-                let material = py.detach(|| OnNodes::new(&self.nodes, factors, self.scale, pairs.wi.len()));
+                let material = py.detach(|| NodeMaterial::new(&self.steps, factors, self.scale, pairs.wi.len()));
                 pairs.evaluated(py, &material, simd, threads)
             })
         })
@@ -179,17 +183,17 @@ impl<'a> Pairs<'a> {
     fn evaluated<'py>(
         &self,
         py: Python<'py>,
-        material: &(impl Material + Send),
+        material: &impl Material,
         simd: Option<&str>,
         threads: Option<usize>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let (path, threads) = (path_named(simd)?, threads::allowed(py, threads)?);
+        let (set, threads) = (instruction_set(simd)?, allowed(py, threads)?);
         // SAFETY: `eval` writes every element. NumPy gives large arrays large pages, which calloc's zeros do not get.
         let found = unsafe { PyArray2::new(py, [self.wi.len(), 3], false) };
         {
             let mut out = found.try_readwrite()?;
             let (rows, _) = out.as_slice_mut()?.as_chunks_mut::<3>();
-            py.detach(|| eval::eval(self.wi, self.wo, material, path, threads, rows));
+            py.detach(|| eval(self.wi, self.wo, material, set, threads, rows));
         }
         Ok(found)
     }

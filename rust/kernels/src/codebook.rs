@@ -1,6 +1,6 @@
-//! Nearest codeword (Eq. 1), exactly: with all of them, or with the few that bounding boxes leave.
+//! The nearest of several entries (Eq. 1), found exactly: by comparing with all, or with those in the boxes that can hold it.
 
-use crate::simd::{Line, Simd};
+use sommerl_simd::{Line, Simd};
 
 /// Squared Euclidean distance, summed as (r² + g²) + b².
 #[inline(always)]

@@ -1,39 +1,44 @@
 //! How likely each entry of the palette is for the next node, given the nodes before it: the same calculation when entries are
-//! chosen, written and read. Nothing but +, −, ×, ÷, √ and ⌊⌋ of IEEE 754 doubles, in the order written: all machines agree.
+//! chosen, written and read. It uses +, −, ×, ÷, √ and ⌊⌋ of IEEE 754 doubles alone, in the order written, so that all machines
+//! get the same bits.
 
-use super::entries::{Entries, Expected};
-use super::predictor::Predictor;
-use super::range::Coder;
-use super::{Axes, FINE, Palette};
+use crate::entries::{Entries, Expected};
+use crate::lattice::{FINE, NodeLattice};
+use crate::palette::Palette;
+use crate::predictor::Predictor;
 
 /// A node's coordinates: octaves of the gain, and the two of the shape.
-pub const CHANNELS: usize = 3;
+const CHANNELS: usize = 3;
 type Node = [f64; CHANNELS];
 
-/// Nodes on the grid (θ_d, φ_d) of a band.
+/// The nodes of a row, or a row's nodes moved to the places of another band.
 #[derive(Default)]
 struct Plane {
     values: Vec<Node>,
+    /// How far each prediction was off.
     errors: Vec<Node>,
 }
 
+/// The model of the entries. For each row call `begin`; then for each node `expect`, the weights, and `update`, in this order.
 pub struct Model<'a> {
-    axes: &'a Axes,
+    lattice: &'a NodeLattice,
     predictors: [Predictor; CHANNELS],
     gains: Entries,
     shapes: Entries,
     row: usize,
+    /// The present row, the one before it, and the one before that.
     present: Plane,
     above: Plane,
     higher: Plane,
 }
 
 impl<'a> Model<'a> {
-    pub fn new(axes: &'a Axes, palette: &Palette) -> Self {
+    /// Before the first row.
+    pub fn new(lattice: &'a NodeLattice, palette: &Palette) -> Self {
         let [gains, first, second] = palette.places();
         let flat = vec![0.0; gains.len()];
         Model {
-            axes,
+            lattice,
             predictors: [&gains, &first, &second].map(|places| Predictor::new(places)),
             gains: Entries::new([gains, flat]),
             shapes: Entries::new([first, second]),
@@ -50,24 +55,24 @@ impl<'a> Model<'a> {
         if row > 0 {
             self.higher = std::mem::take(&mut self.above);
             self.above = std::mem::take(&mut self.present);
-            let (from, to) = (self.axes.band[row - 1] as usize, self.axes.band[row] as usize);
+            let (from, to) = (self.lattice.band[row - 1] as usize, self.lattice.band[row] as usize);
             if from != to {
                 self.above = self.moved(&self.above, from, to);
                 self.higher = if row > 1 { self.moved(&self.higher, from, to) } else { Plane::default() };
             }
         }
-        let size = self.axes.nodes_in(row);
+        let size = self.lattice.nodes_in(row);
         self.present = Plane { values: vec![[0.0; CHANNELS]; size], errors: vec![[0.0; CHANNELS]; size] };
     }
 
-    /// A plane on another band's nodes, by bilinear interpolation.
+    /// A plane at the places of another band, by bilinear interpolation.
     fn moved(&self, plane: &Plane, from: usize, to: usize) -> Plane {
-        let width = self.axes.phi_d[from].len();
+        let width = self.lattice.phi_d[from].len();
         let mut moved = Plane::default();
-        for &y in &self.axes.theta_d[to] {
-            let (d0, d1, v) = between(&self.axes.theta_d[from], y);
-            for &x in &self.axes.phi_d[to] {
-                let (p0, p1, u) = around(&self.axes.phi_d[from], x);
+        for &y in &self.lattice.theta_d[to] {
+            let (d0, d1, v) = between(&self.lattice.theta_d[from], y);
+            for &x in &self.lattice.phi_d[to] {
+                let (p0, p1, u) = around(&self.lattice.phi_d[from], x);
                 let blend = |values: &[Node], c: usize| {
                     let low = values[d0 * width + p0][c] * (1.0 - u) + values[d0 * width + p1][c] * u;
                     let high = values[d1 * width + p0][c] * (1.0 - u) + values[d1 * width + p1][c] * u;
@@ -80,12 +85,12 @@ impl<'a> Model<'a> {
         moved
     }
 
-    /// Before a node: what its coordinates are likely to be. d, p: its numbers in θ_d and φ_d.
+    /// Before a node: predicts its coordinates. d, p: its numbers in θ_d and φ_d.
     #[inline(always)]
     pub fn expect(&mut self, d: usize, p: usize) {
-        let band = self.axes.band[self.row] as usize;
-        let phi_d = &self.axes.phi_d[band];
-        let (width, height) = (phi_d.len(), self.axes.theta_d[band].len());
+        let band = self.lattice.band[self.row] as usize;
+        let phi_d = &self.lattice.phi_d[band];
+        let (width, height) = (phi_d.len(), self.lattice.theta_d[band].len());
         let (at, under) = (d * width + p, self.row > 0);
         let [west, east] = [(p + width - 1) % width, (p + 1) % width].map(|q| d * width + q);
         let mirror = (p > 0).then(|| FINE - phi_d[p]).filter(|&m| m <= phi_d[p - 1]);
@@ -128,7 +133,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// The weights of all gains for the node that is expected.
+    /// The weights of all gains for the node of `expect`.
     #[inline(always)]
     pub fn gain_weights(&mut self) -> &[u32] {
         let expected = self.gain_expected();
@@ -136,7 +141,7 @@ impl<'a> Model<'a> {
         &self.gains.weights
     }
 
-    /// The weights of all shapes.
+    /// The weights of all shapes for the node of `expect`.
     #[inline(always)]
     pub fn shape_weights(&mut self) -> &[u32] {
         let expected = self.shape_expected();
@@ -144,13 +149,13 @@ impl<'a> Model<'a> {
         &self.shapes.weights
     }
 
-    /// Entries of both palettes within reach, added up over all nodes so far.
+    /// The number of gains and shapes whose weights were calculated and not taken as 1, added up over all nodes so far.
     #[inline(always)]
     pub fn reached(&self) -> usize {
         self.gains.reached + self.shapes.reached
     }
 
-    /// A gain has one coordinate; the other never differs.
+    /// Gains have one coordinate: the second is 0 and is given no weight.
     #[inline(always)]
     fn gain_expected(&self) -> Expected {
         [self.predictors[0].expected(), (0.0, 0.0)]
@@ -161,16 +166,7 @@ impl<'a> Model<'a> {
         [self.predictors[1].expected(), self.predictors[2].expected()]
     }
 
-    /// Writes or reads the entries of the node that is expected.
-    #[inline(always)]
-    pub fn node(&mut self, coder: &mut impl Coder, at: usize, gain: usize, shape: usize) -> (usize, usize) {
-        let gain = coder.pick(gain, self.gain_weights());
-        let shape = coder.pick(shape, self.shape_weights());
-        self.update(at, gain, shape);
-        (gain, shape)
-    }
-
-    /// What follows for the nodes to come. at: the node's number in its row.
+    /// After a node: adapts to the entries that it has. at: its number in its row.
     #[inline(always)]
     pub fn update(&mut self, at: usize, gain: usize, shape: usize) {
         let (gain_expected, shape_expected) = (self.gain_expected(), self.shape_expected());
@@ -184,7 +180,8 @@ impl<'a> Model<'a> {
     }
 }
 
-/// The nodes on either side of a place within the axis, and the way to the second.
+/// The nodes on either side of a place, and how far it lies from the first to the second, from 0 to 1. At or after the last node,
+/// both are the last.
 fn between(axis: &[u8], place: u8) -> (usize, usize, f64) {
     let upper = axis.partition_point(|&x| x <= place);
     if upper == axis.len() {
@@ -194,7 +191,7 @@ fn between(axis: &[u8], place: u8) -> (usize, usize, f64) {
     (upper - 1, upper, f64::from(place - a) / f64::from(b - a))
 }
 
-/// The same on an axis that starts at 0 and returns there at FINE.
+/// The same on an axis whose first node, at 0, comes again at FINE.
 fn around(axis: &[u8], place: u8) -> (usize, usize, f64) {
     let last = axis.len() - 1;
     if place < axis[last] {

@@ -3,8 +3,11 @@
 //! The arithmetic is 32-bit, in the order written here, without fused multiply-add, and is the same,
 //! bit for bit, as in `python/sommerl/compression/paper/reference.py`.
 
-use crate::nearest::{Codebook, squared_distance};
-use crate::simd::{Path, Portable, Simd};
+use std::ops::Range;
+
+use sommerl_simd::{InstructionSet, Simd, for_each_instruction_set};
+
+use crate::codebook::{Codebook, squared_distance};
 
 /// Stored originals of a unit (the paper's k).
 pub const STORED: usize = 3;
@@ -26,31 +29,35 @@ impl Originals {
     }
 }
 
-/// Learning rule for the weights: Eq. 2 with its factor x (`paper`) or without it (`kohonen`).
+/// The learning rule for the weights.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Rule {
+    /// Eq. 2 as printed, with its factor x.
     Paper,
+    /// Without that factor.
     Kohonen,
 }
 
-/// How the winner is found. The result is the same.
+/// How the winner is found. It is the same in each way.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Search {
     /// In the boxes that may hold it, starting from the last epoch's winner.
     Boxes,
-    /// Among all units: the peer that the former is measured against, and what is best when all units move.
+    /// Among all units, sixteen at a time. This is fastest when all units move.
     All,
-    /// Among all units, one by one: what a textbook does.
+    /// Among all units, one by one, as a textbook does.
     Scalar,
 }
 
 /// Everything that stays the same during one epoch.
 pub struct Epoch<'a> {
+    /// The learning rate.
     pub alpha: f32,
     /// Gaussian weights by distance along an axis of the sheet; a single 1 means that only the winner learns.
     pub falloff: &'a [f32],
 }
 
+/// The units of the SOM and their MANs, in training.
 pub struct Learner {
     /// What the cells hold, and their numbers, in the order of presentation.
     triples: Vec<[f32; 3]>,
@@ -64,16 +71,21 @@ pub struct Learner {
     /// Whether any weight has changed in this epoch, and what was stored before it.
     moved: bool,
     before: Vec<Originals>,
+    /// The learning rule.
     pub rule: Rule,
     /// Whether a cell that a unit has stored takes its own place when it comes back, instead of another slot.
     pub distinct: bool,
     /// Units in a row of the sheet; a chain is a sheet of one row.
     pub columns: usize,
-    pub path: Path,
+    /// The instruction set to use.
+    pub set: InstructionSet,
+    /// How winners are found.
     pub search: Search,
 }
 
+#[allow(clippy::len_without_is_empty)]
 impl Learner {
+    /// triples: what the cells hold, and the cells' numbers, in the order of presentation. weights: the units' first ones.
     pub fn new(triples: Vec<[f32; 3]>, cells: Vec<u32>, weights: &[[f32; 3]]) -> Self {
         let nothing = Originals { x: [[f32::INFINITY; 4]; 3], cell: [EMPTY; 4] };
         let stored = vec![nothing; weights.len()];
@@ -89,15 +101,17 @@ impl Learner {
             rule: Rule::Kohonen,
             distinct: false,
             columns: weights.len(),
-            path: Path::available().last().map_or(Path::Portable, |&(_, path)| path),
+            set: InstructionSet::fastest(),
             search: Search::Boxes,
         }
     }
 
+    /// The number of triples.
     pub fn len(&self) -> usize {
         self.triples.len()
     }
 
+    /// The units' weights.
     pub fn weights(&self) -> Vec<[f32; 3]> {
         self.weights.entries()
     }
@@ -107,8 +121,8 @@ impl Learner {
         self.stored.iter().map(|unit| [unit.cell[0], unit.cell[1], unit.cell[2]]).collect()
     }
 
-    /// Whether the epoch that ends here left everything as it was. Then so will every later one: with a smaller α each step is
-    /// smaller, and a step that was rounded away stays so.
+    /// To be asked at the end of each epoch: whether it changed no weight and no stored original. Then later epochs change nothing
+    /// either: with a smaller α each step is smaller, and a step that was rounded to nothing still is.
     pub fn settled(&mut self) -> bool {
         let settled = !self.moved && self.stored == self.before;
         self.moved = false;
@@ -117,38 +131,17 @@ impl Learner {
     }
 
     /// Presents a range of the order. Returns the sum of the distances to the winners' weights.
-    pub fn present(&mut self, range: std::ops::Range<usize>, epoch: &Epoch) -> f64 {
+    pub fn present(&mut self, range: Range<usize>, epoch: &Epoch) -> f64 {
         if self.search == Search::Boxes && epoch.falloff.len() == 1 {
             self.weights.rearrange();
         } else {
             self.weights.order();
         }
-        // SAFETY: a path is only ever one that this processor has.
-        unsafe {
-            match self.path {
-                Path::Portable => self.present_all::<Portable>(range, epoch),
-                #[cfg(target_arch = "x86_64")]
-                Path::Avx2 => self.present_avx2(range, epoch),
-                #[cfg(target_arch = "x86_64")]
-                Path::Avx512 => self.present_avx512(range, epoch),
-            }
-        }
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    unsafe fn present_avx2(&mut self, range: std::ops::Range<usize>, epoch: &Epoch) -> f64 {
-        unsafe { self.present_all::<crate::simd::Avx2>(range, epoch) }
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f")]
-    unsafe fn present_avx512(&mut self, range: std::ops::Range<usize>, epoch: &Epoch) -> f64 {
-        unsafe { self.present_all::<crate::simd::Avx512>(range, epoch) }
+        present(self.set, self, range, epoch)
     }
 
     #[inline(always)]
-    unsafe fn present_all<S: Simd>(&mut self, range: std::ops::Range<usize>, epoch: &Epoch) -> f64 {
+    unsafe fn present_all<S: Simd>(&mut self, range: Range<usize>, epoch: &Epoch) -> f64 {
         unsafe {
             match (self.rule, epoch.falloff.len()) {
                 (Rule::Paper, 1) => self.present_each::<S, true, false>(range, epoch),
@@ -162,7 +155,7 @@ impl Learner {
     #[inline(always)]
     unsafe fn present_each<S: Simd, const PAPER: bool, const NEIGHBOURS: bool>(
         &mut self,
-        range: std::ops::Range<usize>,
+        range: Range<usize>,
         epoch: &Epoch,
     ) -> f64 {
         let mut total = 0.0;
@@ -186,16 +179,16 @@ impl Learner {
             let (stored, cell) = (&mut self.stored[winner], self.cells[k]);
             let own = if self.distinct { stored.slot_of(cell) } else { None };
             let weight = attract::<PAPER>(stored, own, learnt, x, cell, epoch.alpha);
-            // Two steps that cancel are no rest: smaller ones need not cancel.
+            // Two steps that cancel count as movement: smaller ones may not cancel.
             self.moved |= (learnt != old) | (weight != learnt);
             self.weights.set(winner, weight);
         }
         total
     }
 
-    /// The winner of presentation k, searched for from where it is likely to be: the winner of the same cell in the last epoch; or,
-    /// where units move so far that they take over others' cells, the nearest of that, of the last winner of a similar
-    /// triple, and of the last winner of all.
+    /// The winner of presentation k. The search starts from a guess: the winner of the same cell in the last epoch. Where units move
+    /// so far that many cells change their winners, it is the nearest of three: that one, the last winner of a similar triple, and
+    /// the winner of the presentation before.
     #[inline(always)]
     unsafe fn winner<S: Simd>(&mut self, k: usize, x: [f32; 3], watch: &mut Watch) -> (usize, f32) {
         let mut guess = self.winners[k];
@@ -242,6 +235,13 @@ impl Learner {
     }
 }
 
+for_each_instruction_set! {
+    fn present(learner: &mut Learner, range: Range<usize>, epoch: &Epoch) -> f64 {
+        // SAFETY: the function is compiled for the instruction set of `Lanes`.
+        unsafe { learner.present_all::<Lanes>(range, epoch) }
+    }
+}
+
 /// Watches over the search, window by window of presentations.
 #[derive(Default)]
 struct Watch {
@@ -257,8 +257,8 @@ struct Watch {
 impl Watch {
     const WINDOW: usize = 1024;
 
-    /// To be asked before each presentation: whether the boxes, which grow as units move, have become so loose that new ones
-    /// are worth their time. After a yes, they count as new.
+    /// To be asked before each presentation: whether the boxes, which grow as units move, have become so large that it is worth the
+    /// time to make new ones. The caller then does.
     #[inline(always)]
     fn loose(&mut self) -> bool {
         self.presented += 1;
@@ -330,7 +330,7 @@ fn one_by_one(weights: &Codebook, x: [f32; 3]) -> (usize, f32) {
 
 const SIMILAR_BITS: u32 = 14;
 
-/// A number that triples of about the same colour and brightness share: exponents and leading bits of the mantissas, hashed.
+/// A hash of exponents and leading bits of mantissas, so that triples of about the same colour and brightness have the same.
 #[inline(always)]
 fn similar_to(x: [f32; 3]) -> usize {
     let [r, g, b] = x.map(|v| v.to_bits() >> 20);

@@ -1,63 +1,72 @@
-//! A range coder over whole-number weights, and whole numbers with adaptive bits: what the bits of a material's nodes are
-//! written with.
+//! A range coder for symbols with whole-number weights, and for numbers whose bits' chances adapt.
 //!
-//! Zeros at the end of a stream are left out; a decoder reads them beyond it. What it finds has one stream alone: any other
-//! that would mean the same is refused.
+//! Zeros at the end of a stream are not stored: a decoder that has come to the end reads zeros. Each sequence of symbols has one
+//! stream: `Decoder::is_the_encoders` tells whether the one that was read is the one that an encoder writes.
 
 const BOTTOM: u32 = 1 << 24;
 
-/// Chances of bits that learn, out of `EVEN + EVEN`.
-pub type Bits = [u32; 24];
+/// The chances of 24 bits to be one, out of `2 * EVEN`; they adapt to the bits that come.
+pub type Context = [u32; 24];
 const EVEN: u32 = 1 << 11;
-pub const FRESH: Bits = [EVEN; 24];
+/// A context before the first bit.
+pub const FRESH: Context = [EVEN; 24];
+/// A bit moves its chance by 2^-RATE of the way.
 const RATE: u32 = 4;
+/// The most bits that a number has after the first.
 const LONGEST: u32 = 20;
 
-/// Either end of the coder: an encoder writes what it is given, a decoder finds it.
+/// What is common to writing and to reading, so that a part of the format is one function for both. The function passes each value
+/// and goes on with the one that is returned. An `Encoder` writes the value that is passed, and returns it. A `Decoder` ignores
+/// the value that is passed, for which 0 does, and returns the one that it reads. A `BitCounter` adds up what the value takes, and
+/// returns it.
 pub trait Coder {
-    /// One of several symbols, by weights that are all above 0 and add up to less than 2^24.
+    /// One of several symbols. Weights are all above 0, and their sum is below 2^24.
     fn pick(&mut self, symbol: usize, weights: &[u32]) -> usize;
 
-    /// Whether something was found that no encoder writes. All that came after it means nothing.
+    /// Whether a decoder has read what is no symbol. What it has returned since then means nothing.
     fn lost(&self) -> bool {
         false
     }
 
-    /// A bit whose chance to be one learns from it.
+    /// A bit. `one`: its chance to be one, which adapts to it.
     fn bit(&mut self, bit: bool, one: &mut u32) -> bool {
         let bit = self.pick(bit.into(), &[2 * EVEN - *one, *one]) == 1;
         *one = if bit { *one + ((2 * EVEN - *one) >> RATE) } else { *one - (*one >> RATE) };
         bit
     }
 
-    /// A whole number below 2^21 − 1: with 1 added, how many bits it has after the first, one by one; then these.
-    fn number(&mut self, value: u32, bits: &mut Bits) -> u32 {
+    /// A whole number below 2^21 − 1. With 1 added, it has a leading one and n bits after it: n is coded first, as n ones and a
+    /// zero; then the bits, of which the highest has a chance that adapts if n < 5, and the others are even.
+    fn number(&mut self, value: u32, context: &mut Context) -> u32 {
         let length = (value + 1).ilog2();
         let mut found = 0;
-        while found < LONGEST && self.bit(found < length, &mut bits[found as usize]) {
+        while found < LONGEST && self.bit(found < length, &mut context[found as usize]) {
             found += 1;
         }
         let mut number = 1;
         for i in (0..found).rev() {
             let bit = (value + 1) >> i & 1 == 1;
             let first = i + 1 == found && i < 4;
-            let one = if first { &mut bits[(LONGEST + i) as usize] } else { &mut EVEN.clone() };
+            let one = if first { &mut context[(LONGEST + i) as usize] } else { &mut EVEN.clone() };
             number = 2 * number + u32::from(self.bit(bit, one));
         }
         number - 1
     }
 
-    /// A whole number of either sign: 0, −1, 1, −2, … as 0, 1, 2, 3, …
-    fn signed(&mut self, value: i32, bits: &mut Bits) -> i32 {
-        let folded = self.number(((value << 1) ^ (value >> 31)) as u32, bits);
+    /// A whole number of either sign: 0, −1, 1, −2, … are coded as 0, 1, 2, 3, …
+    fn signed(&mut self, value: i32, context: &mut Context) -> i32 {
+        let folded = self.number(((value << 1) ^ (value >> 31)) as u32, context);
         (folded >> 1) as i32 ^ -((folded & 1) as i32)
     }
 }
 
-/// After Schindler (1998) and LZMA's: a carry runs back through bytes that are held until none can come any more.
+/// Writes symbols. After Schindler (1998) and the coder of LZMA: the last byte before a run of 0xff, and the run, are held back,
+/// because a carry out of the bytes after them would change them.
 pub struct Encoder {
+    /// The lower end of the interval, with a carry in bit 32; and its width.
     low: u64,
     range: u32,
+    /// The byte that is held back, and the number of bytes of 0xff after it.
     held: u8,
     full: usize,
     out: Vec<u8>,
@@ -68,6 +77,7 @@ impl Encoder {
         Encoder { low: 0, range: u32::MAX, held: 0, full: 0, out: Vec::new() }
     }
 
+    /// Moves the highest byte of `low` out.
     fn shift(&mut self) {
         let carry = self.low > u32::MAX.into();
         if carry || self.low < 0xff00_0000 {
@@ -80,12 +90,13 @@ impl Encoder {
         self.low = (self.low & 0x00ff_ffff) << 8;
     }
 
+    /// The stream: the shortest that a decoder reads the same symbols from.
     pub fn finish(mut self) -> Vec<u8> {
         self.low = roundest(self.low, self.range);
         for _ in 0..5 {
             self.shift();
         }
-        self.out.remove(0); // where only a carry out of the whole number could go, which there is none
+        self.out.remove(0); // the byte held at first, for a carry that cannot come: it is 0
         while self.out.last() == Some(&0) {
             self.out.pop();
         }
@@ -93,7 +104,7 @@ impl Encoder {
     }
 }
 
-/// Of all numbers that mean the same, the one with the most zeros at its end.
+/// Of the numbers in an interval, the one with the most zeros at its end.
 fn roundest(low: u64, range: u32) -> u64 {
     let last = low + u64::from(range) - 1;
     let cut = |bits: u32| last >> (32 - bits) << (32 - bits);
@@ -114,12 +125,14 @@ impl Coder for Encoder {
     }
 }
 
+/// Reads symbols, of which there are as many as are asked for.
 pub struct Decoder<'a> {
+    /// The distance of the stream's number from the lower end of the interval, and the interval's width.
     code: u32,
     range: u32,
     /// The last four bytes read.
     window: u32,
-    /// Whether the code has been beyond all symbols, where no encoder leads.
+    /// Whether the code has ever been beyond the last symbol, which no encoder leads to.
     lost: bool,
     data: &'a [u8],
     read: usize,
@@ -134,13 +147,14 @@ impl<'a> Decoder<'a> {
         decoder
     }
 
+    /// Moves the next byte in.
     fn shift(&mut self) {
         let byte = u32::from(*self.data.get(self.read).unwrap_or(&0));
         self.read += 1;
         (self.code, self.window) = (self.code << 8 | byte, self.window << 8 | byte);
     }
 
-    /// Whether the stream is the one that an encoder writes for what was found.
+    /// Whether the stream is the one that an encoder writes for the symbols that were read.
     pub fn is_the_encoders(&self) -> bool {
         let low = self.window.wrapping_sub(self.code);
         let ends = self.read >= self.data.len() && self.data.last() != Some(&0);
@@ -175,10 +189,10 @@ impl Coder for Decoder<'_> {
     }
 }
 
-/// Counts the bits that would be written.
-pub struct Counter(pub f64);
+/// Adds up the bits that symbols take.
+pub struct BitCounter(pub f64);
 
-impl Coder for Counter {
+impl Coder for BitCounter {
     #[inline(always)]
     fn pick(&mut self, symbol: usize, weights: &[u32]) -> usize {
         self.0 += bits_of(weights[symbol], weights.iter().sum());
@@ -186,7 +200,7 @@ impl Coder for Counter {
     }
 }
 
-/// What a symbol of so much of the whole weight takes, in bits.
+/// The bits that a symbol takes. total: the sum of all symbols' weights.
 pub fn bits_of(weight: u32, total: u32) -> f64 {
     (f64::from(total) / f64::from(weight)).log2()
 }

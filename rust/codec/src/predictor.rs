@@ -1,24 +1,30 @@
-//! What a coordinate of a node is likely to be, learnt from the nodes before it: recursive least squares, exactly as written.
+//! Predicts one coordinate of a node from its neighbours by recursive least squares, in the order of operations that
+//! docs/format.md gives.
 
-/// What a node is predicted from: differences between its neighbours and the node above it.
+/// A node is predicted from so many neighbours.
 const NEIGHBOURS: usize = 10;
+/// A number for each neighbour.
 pub type Row = [f64; NEIGHBOURS];
+/// The weights of the neighbours at first.
 const FIRST: Row = [0.5, 0.5, 0.0, 0.0, -0.5, -0.5, 0.0, 0.0, 0.0, 0.0];
+/// 1 / the factor by which earlier nodes lose their influence with each new one.
 const FORGET: f64 = 1.0005;
 
-/// A predictor of one coordinate: recursive least squares on the neighbours.
+/// The predictor, and its prediction for the present node.
 pub struct Predictor {
     weights: Row,
+    /// The inverse of the neighbours' correlation matrix.
     inverse: [Row; NEIGHBOURS],
-    /// The usual error.
+    /// A running mean of the errors.
     level: f64,
+    /// The neighbours of the present node, less the node above it; what they predict; and the error that is expected.
     neighbours: Row,
     predicted: f64,
-    /// The error expected for the present node.
     scale: f64,
 }
 
 impl Predictor {
+    /// values: the coordinate's in all entries of the palette.
     pub fn new(values: &[f64]) -> Self {
         let count = values.len() as f64;
         let mean = values.iter().sum::<f64>() / count;
@@ -31,7 +37,8 @@ impl Predictor {
         Predictor { weights: FIRST, inverse, level, neighbours: [0.0; NEIGHBOURS], predicted: 0.0, scale: level }
     }
 
-    /// up: the value that all others are compared with. errors: of the nodes next to it, as far as there are any.
+    /// Predicts a node. up: the value above it, which is subtracted from the neighbours' values. errors: of the predictions of
+    /// the nodes next to it, as far as there are any.
     #[inline(always)]
     pub fn predict(&mut self, up: f64, values: Row, errors: &[Option<f64>]) {
         self.predicted = up;
@@ -47,12 +54,13 @@ impl Predictor {
         self.scale = sum / count + 0.02 * self.level + 1e-4;
     }
 
+    /// The prediction, and 1 / the expected error.
     #[inline(always)]
     pub fn expected(&self) -> (f64, f64) {
         (self.predicted, 1.0 / self.scale)
     }
 
-    /// Returns how far the prediction was off.
+    /// Adapts to the node's value. Returns how far the prediction was off.
     #[inline(always)]
     pub fn learn(&mut self, value: f64) -> f64 {
         let error = value - self.predicted;

@@ -1,34 +1,40 @@
-//! The weights of the entries of a palette around an expected place.
+//! How likely each gain, or each shape, is: weights that fall with the distance from the predicted place.
 
-/// An entry at distance x, in units of the expected error, gets the weight 1 / (1 + x² NARROW)² or 1 / (1 + x² WIDE)².
+/// The two kernels. An entry at distance x, in units of the expected error, has the height 1 / (1 + x² NARROW)² or
+/// 1 / (1 + x² WIDE)².
 const NARROW: f64 = 2.25;
 const WIDE: f64 = 0.25;
-/// All entries together weigh that much, and 1 each.
+/// What the kernels give to all entries together. Each entry has 1 besides.
 const WHOLE: f64 = 65536.0;
-/// Sums are taken in that many parts, which lie side by side.
+/// A sum is calculated as that many sums, each of every fourth number, which one vector holds.
 const LANES: usize = 4;
-/// Entries whose first coordinate is farther away than that, in expected errors, have the weight 1; in whole steps.
+/// Entries whose first coordinate is farther away than that, in expected errors, have the weight 1. The distance is rounded
+/// outwards to whole steps, of which there are `STEPS_TO_1` to 1 and `FARTHEST_STEP` to either side of 0.
 const REACH: f64 = 16.0;
 const STEPS_TO_1: f64 = 64.0;
 const FARTHEST_STEP: f64 = 2048.0;
 
-/// For both coordinates of an entry: what is predicted, and 1 / the expected error.
+/// For both coordinates: what is predicted, and 1 / the expected error.
 pub type Expected = [(f64, f64); 2];
 
-/// Entries to choose from: their coordinates, and what is known of how often they come.
+/// The gains, or the shapes: where they are, and how often each one has come so far.
 pub struct Entries {
+    /// Both coordinates of each entry. The first does not decrease.
     pub places: [Vec<f64>; 2],
     /// For each step of the first coordinate, how many entries lie before it.
     before: Vec<u16>,
+    /// 1 + how often each entry has come, and the square roots, which kernels are multiplied with.
     counts: Vec<f64>,
     roots: Vec<f64>,
     /// The share of the narrow kernel.
     narrow: f64,
-    /// What the kernels are multiplied with, so that together they hold 1.
+    /// What the two kernels are multiplied with, so that over all entries both together add up to 1.
     factors: [f64; 2],
+    /// What `weigh` found.
     pub weights: Vec<u32>,
-    /// Entries within reach, added up over all nodes so far.
+    /// The number of entries within `REACH`, added up over all calls of `weigh`.
     pub reached: usize,
+    /// Memory for the heights of the two kernels.
     heights: [Vec<f64>; 2],
 }
 
@@ -55,6 +61,7 @@ impl Entries {
         }
     }
 
+    /// Calculates `weights`.
     #[inline(always)]
     pub fn weigh(&mut self, expected: &Expected) {
         let [(p0, s0), (p1, s1)] = *expected;
@@ -77,6 +84,7 @@ impl Entries {
         }
     }
 
+    /// Adapts to the entry that came. expected: as for the last call of `weigh`.
     #[inline(always)]
     pub fn learn(&mut self, entry: usize, expected: &Expected) {
         let x = (self.places[0][entry] - expected[0].0) * expected[0].1;
@@ -95,7 +103,7 @@ fn step(place: f64) -> usize {
     (place * STEPS_TO_1 + FARTHEST_STEP).clamp(0.0, 2.0 * FARTHEST_STEP) as usize
 }
 
-/// The height of the narrow and of the wide kernel at a distance.
+/// The heights of the narrow and of the wide kernel at a distance, times the root.
 #[inline(always)]
 fn kernels(root: f64, x: f64, y: f64) -> (f64, f64) {
     let (x, y) = (x * x, y * y);
@@ -106,6 +114,7 @@ fn kernels(root: f64, x: f64, y: f64) -> (f64, f64) {
     (both * b, both * a)
 }
 
+/// The sum, in the order that docs/format.md calls `sum4`.
 #[inline(always)]
 fn sum(values: &[f64]) -> f64 {
     let mut lanes = [0.0; LANES];

@@ -1,66 +1,61 @@
-//! Lookup of many pairs of directions on a lattice of nodes: the same formulas, in the same order, as `nodes.py`, but with
-//! divisions by the nodes' distances done beforehand.
+//! Lookup in a compact material: the same formulas, in the same order, as `reflectance/nodes.py`, but for divisions by the distances
+//! between nodes, which are done beforehand.
 
-use crate::eval::{BATCH, Material, Pairs, Room};
+use sommerl_codec::NodeLattice;
 
-/// Constants as in `nodes.py`.
-const FINE: usize = 180;
+use crate::lookup::{BATCH, Material, Pairs, Room};
+
+/// The constants of `reflectance/nodes.py`.
+const FINE: usize = sommerl_codec::FINE as usize;
 const KNEE: f64 = 90.0;
 const BELOW: f64 = 360.0;
 const ABOVE: f64 = 120.0;
 const SMALLEST_COSINE: f64 = 0.01;
 
-/// Between which nodes of an axis a step of the fine grid lies.
+/// The two nodes of an axis that a step of the fine grid lies between.
 #[derive(Clone, Copy)]
 struct Step {
-    /// The two nodes, counted from the axis' first in nodes of the lattice.
+    /// How far the number of the node below, and of the one after, is from the number of the axis' first node.
     below: u32,
     after: u32,
+    /// The place of the node below, and 1 / the distance to the one after.
     place: f64,
     per_width: f64,
 }
 
 impl Step {
-    /// How far x lies from the node below to the one after.
+    /// How far a place lies from the node below to the one after, from 0 to 1.
     #[inline(always)]
     fn share(&self, x: f64) -> f64 {
         ((x - self.place) * self.per_width).clamp(0.0, 1.0)
     }
 }
 
-/// One for every byte, so that none leads outside: those beyond the fine grid are as its last.
+/// A step for every byte, so that no check is needed: those beyond the fine grid are like its last one.
 type Axis = [Step; 256];
 
-/// Nodes in θ_d and φ_d, which the rows of a band share.
+/// The axes of a band.
 struct Band {
     theta_d: Axis,
     phi_d: Axis,
 }
 
-/// A `NodeLattice`, as tables by step of the fine grid.
-pub struct Nodes {
+/// A lattice of nodes, prepared for lookup: tables of the steps of the fine grid.
+pub struct NodeSteps {
     rows: Axis,
     bands: Vec<Band>,
     /// For each step in θ_h the bands of the rows below and after.
     band: [[u8; 2]; 256],
-    pub size: usize,
+    nodes: usize,
 }
 
-impl Nodes {
-    /// None where `NodeLattice` would complain: then no step leads outside the nodes.
-    pub fn new(theta_h: &[u8], band: &[u8], theta_d: &[Vec<u8>], phi_d: &[Vec<u8>]) -> Option<Nodes> {
-        let spans = |axis: &[u8]| increases(axis) && axis.len() > 1 && axis[axis.len() - 1] as usize == FINE;
-        let turns = |axis: &[u8]| increases(axis) && (axis[axis.len() - 1] as usize) < FINE;
-        if !spans(theta_h)
-            || !theta_d.iter().all(|axis| spans(axis))
-            || !phi_d.iter().all(|axis| turns(axis))
-            || theta_d.len() != phi_d.len()
-            || band.len() != theta_h.len()
-            || band.iter().any(|&b| b as usize >= theta_d.len())
-            || (0..theta_d.len()).any(|b| !band.iter().any(|&other| other as usize == b))
-        {
+impl NodeSteps {
+    /// None if the lattice is not valid.
+    pub fn new(lattice: &NodeLattice) -> Option<NodeSteps> {
+        if !lattice.is_valid() {
             return None;
         }
+        let NodeLattice { theta_h, band, theta_d, phi_d } = lattice;
         let mut base = vec![0];
         for &b in band {
             base.push(base[base.len() - 1] + (theta_d[b as usize].len() * phi_d[b as usize].len()) as u32);
@@ -74,11 +69,16 @@ impl Nodes {
             }
         });
         let band = below(theta_h).map(|row| [band[row], band[row + 1]]);
-        let (rows, size) = (steps(theta_h, |row| base[row]), base[base.len() - 1] as usize);
-        Some(Nodes { rows, bands: bands.collect(), band, size })
+        let rows = steps(theta_h, |row| base[row]);
+        Some(NodeSteps { rows, bands: bands.collect(), band, nodes: lattice.nodes() })
     }
 
-    /// y at a place on the fine grid, in the order of `NodeLattice.corners`.
+    /// The number of nodes.
+    pub fn nodes(&self) -> usize {
+        self.nodes
+    }
+
+    /// The value at a place on the fine grid, added up in the order of `NodeLattice.corners`. step: that it lies in.
     #[inline(always)]
     fn blend(&self, [x, y, z]: [f64; 3], step: [u8; 3], value: impl Fn(usize) -> [f64; 4]) -> [f64; 4] {
         let [h, d, p] = step.map(usize::from);
@@ -102,11 +102,8 @@ impl Nodes {
     }
 }
 
-fn increases(axis: &[u8]) -> bool {
-    axis.first() == Some(&0) && axis.is_sorted_by(|a, b| a < b)
-}
-
-/// For each step the node at or below its start. axis: places that increase from 0 to FINE.
+/// For each step, the number on its axis of the last node at or below its start, which is never the axis' last. axis: places
+/// that increase from 0 to FINE.
 fn below(axis: &[u8]) -> [usize; 256] {
     let mut node = 0;
     std::array::from_fn(|step| {
@@ -115,7 +112,7 @@ fn below(axis: &[u8]) -> [usize; 256] {
     })
 }
 
-/// number: what a node counts in the lattice.
+/// number: of a node on this axis, how far its number in the lattice is from that of the axis' first node.
 fn steps(axis: &[u8], number: impl Fn(usize) -> u32) -> Axis {
     below(axis).map(|node| {
         let (place, next) = (f64::from(axis[node]), f64::from(axis[node + 1]));
@@ -123,11 +120,16 @@ fn steps(axis: &[u8], number: impl Fn(usize) -> u32) -> Axis {
     })
 }
 
-/// y of the nodes: the product of a gain and a shape each. NaN where an index leads outside.
+/// The values of nodes, in the cube-root domain: a gain times a shape each. NaN where an index leads outside.
+#[derive(Clone, Copy)]
 pub struct Factors<'a> {
+    /// What nodes' gains are chosen from.
     pub gains: &'a [f64],
+    /// What nodes' shapes are chosen from.
     pub shapes: &'a [[f64; 3]],
+    /// The number of each node's gain.
     pub gain: &'a [u16],
+    /// The number of each node's shape.
     pub shape: &'a [u16],
 }
 
@@ -142,6 +144,7 @@ impl Factors<'_> {
             && self.gains.iter().chain(self.shapes.as_flattened()).all(|factor| factor.is_finite())
     }
 
+    /// The value of a node, as four numbers for vectors to hold; the last means nothing.
     #[inline(always)]
     fn value(&self, node: usize) -> [f64; 4] {
         match (entry(self.gains, self.gain, node), entry(self.shapes, self.shape, node)) {
@@ -156,20 +159,21 @@ fn entry<'a, T>(entries: &'a [T], index: &[u16], node: usize) -> Option<&'a T> {
     index.get(node).and_then(|&number| entries.get(number as usize))
 }
 
-/// A material on nodes.
-pub struct OnNodes<'a> {
-    nodes: &'a Nodes,
+/// A compact material.
+pub struct NodeMaterial<'a> {
+    steps: &'a NodeSteps,
     factors: Factors<'a>,
     scale: f64,
-    /// The products, as fours that vectors hold; none for few pairs, which take less time than all products.
+    /// The values of all nodes. Empty for few pairs, whose lookup takes less time than to calculate these.
     values: Vec<[f64; 4]>,
 }
 
-impl<'a> OnNodes<'a> {
-    pub fn new(nodes: &'a Nodes, factors: Factors<'a>, scale: f64, pairs: usize) -> Self {
-        let made = if pairs > nodes.size / 6 { nodes.size } else { 0 };
-        let values = (0..made).map(|node| factors.value(node)).collect();
-        OnNodes { nodes, factors, scale, values }
+impl<'a> NodeMaterial<'a> {
+    /// scale: of the cube-root domain. pairs: how many it will be evaluated for.
+    pub fn new(steps: &'a NodeSteps, factors: Factors<'a>, scale: f64, pairs: usize) -> Self {
+        let count = if pairs > steps.nodes / 6 { steps.nodes } else { 0 };
+        let values = (0..count).map(|node| factors.value(node)).collect();
+        NodeMaterial { steps, factors, scale, values }
     }
 
     #[inline(always)]
@@ -182,10 +186,10 @@ impl<'a> OnNodes<'a> {
         value: impl Fn(usize) -> [f64; 4],
     ) {
         for i in 0..BATCH.min(out.len() / 3) {
-            let f_r = match pairs.told(i) {
-                Some(told) => [told; 4],
+            let f_r = match pairs.known(i) {
+                Some(known) => [known; 4],
                 None => {
-                    let y = self.nodes.blend([0, 1, 2].map(|c| at[c][i]), steps.map(|step| step[i]), &value);
+                    let y = self.steps.blend([0, 1, 2].map(|c| at[c][i]), steps.map(|step| step[i]), &value);
                     y.map(|y| if y > 0.0 { y * y * y * at[3][i] } else { 0.0 })
                 }
             };
@@ -197,7 +201,7 @@ impl<'a> OnNodes<'a> {
     }
 }
 
-impl Material for OnNodes<'_> {
+impl Material for NodeMaterial<'_> {
     #[inline(always)]
     fn batch(&self, pairs: &Pairs, at: &mut Room, out: &mut [[f64; 3]]) {
         let mut steps = [[0; BATCH]; 3];
@@ -225,7 +229,7 @@ fn step(place: f64) -> u8 {
     const LAST: f64 = FINE as f64 - 1.0;
     let place = if place < LAST { place } else { LAST };
     let place = if place > 0.0 { place } else { 0.0 };
-    // SAFETY: it is from 0 to LAST, also if it was no number. The safe conversion does not vectorise.
+    // SAFETY: it is from 0 to LAST, even if it was NaN. The safe conversion does not vectorise.
     unsafe { place.to_int_unchecked::<i32>() as u8 }
 }
 

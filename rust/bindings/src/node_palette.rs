@@ -1,0 +1,158 @@
+//! The stream of compact materials, and the choice of their nodes' entries.
+
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1, ToPyArray};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use sommerl_codec::{CompactMaterial, InstructionSet, NodeLattice, Palette, check_indices, decode, encode, measure};
+use sommerl_kernels::{Quadratic, Values, sweep};
+
+use crate::convert::{instruction_set, invalid, line, rows};
+use crate::guarded;
+
+type Indices<'py> = (Bound<'py, PyArray1<u16>>, Bound<'py, PyArray1<u16>>);
+
+/// A lattice of nodes and a palette.
+#[pyclass]
+pub struct NodePalette {
+    lattice: NodeLattice,
+    palette: Palette,
+}
+
+impl NodePalette {
+    fn material(&self, gain: &PyReadonlyArray1<u16>, shape: &PyReadonlyArray1<u16>) -> PyResult<CompactMaterial> {
+        let (lattice, palette) = (self.lattice.clone(), self.palette.clone());
+        Ok(CompactMaterial {
+            lattice,
+            palette,
+            gain: line(gain, "gain")?.to_vec(),
+            shape: line(shape, "shape")?.to_vec(),
+        })
+    }
+}
+
+#[pymethods]
+impl NodePalette {
+    #[new]
+    fn new(
+        theta_h: Vec<u8>,
+        band: Vec<u8>,
+        theta_d: Vec<Vec<u8>>,
+        phi_d: Vec<Vec<u8>>,
+        gains: Vec<u32>,
+        shapes: Vec<[i32; 2]>,
+    ) -> PyResult<Self> {
+        guarded(|| {
+            let made = NodePalette {
+                lattice: NodeLattice { theta_h, band, theta_d, phi_d },
+                palette: Palette { gains, shapes },
+            };
+            made.lattice.check().map_err(invalid)?;
+            made.palette.check().map_err(invalid)?;
+            Ok(made)
+        })
+    }
+
+    /// The material in a stream: lattice and palette, and each node's entries.
+    #[staticmethod]
+    #[pyo3(signature = (data, simd = None))]
+    fn decode<'py>(py: Python<'py>, data: &[u8], simd: Option<&str>) -> PyResult<(Self, Indices<'py>)> {
+        guarded(|| {
+            let set = instruction_set(simd)?;
+            let CompactMaterial { lattice, palette, gain, shape } = py.detach(|| decode(data, set)).map_err(invalid)?;
+            Ok((NodePalette { lattice, palette }, (gain.to_pyarray(py), shape.to_pyarray(py))))
+        })
+    }
+
+    #[pyo3(signature = (gain, shape, simd = None))]
+    fn encode<'py>(
+        &self,
+        py: Python<'py>,
+        gain: PyReadonlyArray1<u16>,
+        shape: PyReadonlyArray1<u16>,
+        simd: Option<&str>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        guarded(|| {
+            let (material, set) = (self.material(&gain, &shape)?, instruction_set(simd)?);
+            let stream = py.detach(|| encode(&material, set)).map_err(invalid)?;
+            Ok(PyBytes::new(py, &stream))
+        })
+    }
+
+    /// Bits of lattice and palette, and of the indices.
+    fn measure(&self, gain: PyReadonlyArray1<u16>, shape: PyReadonlyArray1<u16>) -> PyResult<(f64, f64)> {
+        guarded(|| measure(&self.material(&gain, &shape)?, InstructionSet::fastest()).map_err(invalid))
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn sweep(
+        &self,
+        py: Python,
+        mut gain: PyReadwriteArray1<u16>,
+        mut shape: PyReadwriteArray1<u16>,
+        gain_values: PyReadonlyArray1<f64>,
+        shape_values: PyReadonlyArray2<f64>,
+        starts: PyReadonlyArray1<i32>,
+        columns: PyReadonlyArray1<i32>,
+        values: PyReadonlyArray1<f64>,
+        right: PyReadonlyArray2<f64>,
+        price: Option<f64>,
+    ) -> PyResult<f64> {
+        guarded(|| {
+            let whole = |_| invalid("gain, shape: expected numbers in one piece");
+            let (gain, shape) = (gain.as_slice_mut().map_err(whole)?, shape.as_slice_mut().map_err(whole)?);
+            check_indices(&self.lattice, &self.palette, gain, shape).map_err(invalid)?;
+            let (starts, columns) = (line(&starts, "starts")?, line(&columns, "columns")?);
+            let (values, right) = (line(&values, "values")?, rows(&right, "right")?);
+            let quadratic = Quadratic { starts, columns, values, right };
+            if !quadratic.fits(self.lattice.nodes()) {
+                return Err(invalid("expected a sparse square matrix with a row for each node"));
+            }
+            let (gains, shapes) = (line(&gain_values, "gain_values")?, rows(&shape_values, "shape_values")?);
+            if gains.len() != self.palette.gains.len() || shapes.len() != self.palette.shapes.len() {
+                return Err(invalid("expected a value for each gain and each shape"));
+            }
+            let numbers = [values, right.as_flattened(), gains, shapes.as_flattened(), price.as_slice()];
+            if !numbers.iter().all(|part| part.iter().all(|x| x.is_finite())) {
+                return Err(invalid("expected finite numbers, found others"));
+            }
+            let values = Values { gains, shapes };
+            Ok(py.detach(|| sweep(&self.lattice, &self.palette, &values, &quadratic, gain, shape, price)))
+        })
+    }
+
+    #[getter]
+    fn theta_h(&self) -> Vec<usize> {
+        self.lattice.theta_h.iter().map(|&x| x.into()).collect()
+    }
+
+    #[getter]
+    fn band(&self) -> Vec<usize> {
+        self.lattice.band.iter().map(|&x| x.into()).collect()
+    }
+
+    #[getter]
+    fn theta_d(&self) -> Vec<Vec<usize>> {
+        widened(&self.lattice.theta_d)
+    }
+
+    #[getter]
+    fn phi_d(&self) -> Vec<Vec<usize>> {
+        widened(&self.lattice.phi_d)
+    }
+
+    #[getter]
+    fn gains(&self) -> Vec<u32> {
+        self.palette.gains.clone()
+    }
+
+    #[getter]
+    fn shapes(&self) -> Vec<[i32; 2]> {
+        self.palette.shapes.clone()
+    }
+}
+
+/// As Python's lists of int: bytes would become an object of type bytes.
+fn widened(axes: &[Vec<u8>]) -> Vec<Vec<usize>> {
+    axes.iter().map(|axis| axis.iter().map(|&x| x.into()).collect()).collect()
+}

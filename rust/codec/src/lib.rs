@@ -1,0 +1,40 @@
+//! The stream that a compact material's file holds: its lattice of nodes, its palette of gains and shapes, and the entries that
+//! each node has. docs/format.md says what each bit means; this is format 1.
+//!
+//! ```
+//! use sommerl_codec::{CompactMaterial, Error, InstructionSet, NodeLattice, Palette, decode, encode};
+//!
+//! let material = CompactMaterial {
+//!     lattice: NodeLattice {
+//!         theta_h: vec![0, 180],
+//!         band: vec![0, 0],
+//!         theta_d: vec![vec![0, 180]],
+//!         phi_d: vec![vec![0]],
+//!     },
+//!     palette: Palette { gains: vec![100, 200], shapes: vec![[0, 0]] },
+//!     gain: vec![0, 1, 1, 0],
+//!     shape: vec![0; 4],
+//! };
+//! let stream = encode(&material, InstructionSet::fastest())?;
+//! assert_eq!(decode(&stream, InstructionSet::fastest())?, material);
+//! # Ok::<(), Error>(())
+//! ```
+
+mod entries;
+mod error;
+mod lattice;
+mod model;
+mod palette;
+mod predictor;
+mod range_coder;
+mod stream;
+#[cfg(test)]
+mod tests;
+
+pub use error::Error;
+pub use lattice::{FINE, NodeLattice};
+pub use model::Model;
+pub use palette::Palette;
+pub use range_coder::bits_of;
+pub use sommerl_simd::InstructionSet;
+pub use stream::{CompactMaterial, check_indices, decode, encode, measure};

@@ -1,0 +1,44 @@
+//! The values that nodes choose from, by their codes.
+
+use crate::error::Error;
+
+/// What a file can hold.
+pub const MOST_ENTRIES: usize = 1 << 10;
+pub const HIGHEST_GAIN: u32 = 1 << 12;
+pub const WIDEST_SHAPE: i32 = 1 << 10;
+/// Gains whose codes differ by that are an octave apart.
+const OCTAVE: u32 = 128;
+/// Coordinates of shapes whose codes differ by that are 1 apart.
+const UNIT: f64 = 64.0;
+
+/// Gains and shapes, by their codes: what a code stands for is in docs/format.md.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Palette {
+    /// Increasing.
+    pub gains: Vec<u32>,
+    /// Two coordinates each, the first of which does not decrease from one shape to the next.
+    pub shapes: Vec<[i32; 2]>,
+}
+
+impl Palette {
+    /// Whether a file can hold the palette. Gives `Error::PaletteSize` or `Error::PaletteCodes` if not.
+    pub fn check(&self) -> Result<(), Error> {
+        let Palette { gains, shapes } = self;
+        if ![gains.len(), shapes.len()].iter().all(|entries| (1..=MOST_ENTRIES).contains(entries)) {
+            return Err(Error::PaletteSize);
+        }
+        let increasing = gains.is_sorted_by(|a, b| a < b) && gains[gains.len() - 1] < HIGHEST_GAIN;
+        let ordered = shapes.is_sorted_by(|a, b| a[0] <= b[0]);
+        if !increasing || !ordered || !shapes.iter().flatten().all(|x| (-WIDEST_SHAPE..=WIDEST_SHAPE).contains(x)) {
+            return Err(Error::PaletteCodes);
+        }
+        Ok(())
+    }
+
+    /// What the model sees of the entries: the octave of each gain, and the first and the second coordinate of each shape.
+    pub(crate) fn places(&self) -> [Vec<f64>; 3] {
+        let gains = self.gains.iter().map(|&code| f64::from(code) / f64::from(OCTAVE)).collect();
+        let [first, second] = [0, 1].map(|axis| self.shapes.iter().map(|s| f64::from(s[axis]) / UNIT).collect());
+        [gains, first, second]
+    }
+}

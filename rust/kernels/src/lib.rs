@@ -1,0 +1,24 @@
+//! Sommerl's hot loops: SOM-MAN training, the nearest entry of a LUT, the choice of nodes' entries, and the lookup of directions in
+//! materials on cells and on nodes.
+//!
+//! Every one gives the same bits on all instruction sets and any number of threads. The package's tests hold training and search
+//! to `compression/paper/reference.py` bit for bit, and lookup to `Brdf.eval` within rounding.
+
+mod cells;
+mod codebook;
+mod learner;
+mod lookup;
+mod nodes;
+mod quantiser;
+mod sweep;
+pub mod threads;
+
+pub use cells::{CellLattice, CellMaterial, Cells};
+pub use learner::{EMPTY, Epoch, Learner, Rule, STORED, Search};
+pub use lookup::{Material, Pairs, Room, eval};
+pub use nodes::{Factors, NodeMaterial, NodeSteps};
+pub use quantiser::Quantiser;
+pub use sweep::{Quadratic, Values, sweep};
+
+#[cfg(test)]
+mod tests;
