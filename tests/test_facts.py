@@ -8,6 +8,7 @@ import pytest
 from helpers import compact_material, must_fail
 
 from sommerl import BrdfTable, Lattice, TrainOptions, train
+from sommerl.compression.smrl.file import LONGEST_FILE
 from sommerl.formats import scattered
 from sommerl.formats.scattered import COARSE, to_table
 from sommerl.reflectance.distance import asymmetry, table_metrics
@@ -164,3 +165,13 @@ def test_bytes_of_nodes():
 
 def check_bytes(material, memory, paper):
     assert (material.bytes_memory, material.bytes_paper) == (memory, paper)
+
+
+def check_longest(bytes_):
+    assert bytes_ == LONGEST_FILE
+
+
+def test_no_file_is_longer():
+    """2 · 2²² + 24 · 2¹⁶ + 2²⁰ = 8,388,608 + 1,572,864 + 1,048,576, as docs/format.md says."""
+    check_longest(11_010_048)
+    must_fail(check_longest, 11_010_049)
