@@ -5,7 +5,7 @@ from math import e, sqrt
 
 import numpy as np
 import pytest
-from helpers import compact_material, must_fail
+from helpers import compact_material, complaint, must_fail
 
 from sommerl import BrdfTable, Lattice, TrainOptions, train
 from sommerl.compression.compact.search import CompactOptions
@@ -15,6 +15,7 @@ from sommerl.formats.scattered import COARSE, to_table
 from sommerl.reflectance.brdf import Brdf
 from sommerl.reflectance.distance import asymmetry, table_metrics
 from sommerl.reflectance.nodes import NodeLattice
+from sommerl.reflectance.origin import check_chain
 from sommerl.reflectance.samples import Samples
 from sommerl.system.errors import OptionError
 
@@ -210,3 +211,19 @@ def test_targets_within_their_bounds(psnr):
             CompactOptions(target_psnr=bad)
     with pytest.raises(OptionError, match="seed: expected 0 to 18446744073709551615, found -1"):
         CompactOptions(seed=-1)
+
+
+def chain(links):
+    """So many sources, the first without its SHA-256, which is in the file's head."""
+    return [{"kind": "som-man", "name": "x"}, *[{"kind": "som-man", "name": "y", "sha256": ""}] * (links - 1)]
+
+
+def check_links(links, sentence=None):
+    assert complaint(check_chain, chain(links)) == sentence
+
+
+def test_chains_have_1_to_8_links():
+    check_links(1)
+    check_links(8)
+    check_links(9, "made_from: expected a list of 1 to 8 sources, found something else")
+    must_fail(check_links, 9)
