@@ -241,3 +241,21 @@ def test_cells_and_energy_of_what_goes_below_zero_by_hand():
     assert (cells, energy) == (2, pytest.approx(1 / 3))
     table = BrdfTable(np.ones((1, 2, 1, 3)), lattice)
     assert scattered._clamped(lattice, np.ones((1, 2, 1, 3)), table) == (0, 0.0)
+
+
+def check_height(found, by_hand):
+    assert found == pytest.approx(by_hand, rel=1e-4)
+
+
+def test_weights_of_neighbours_by_hand():
+    """Pairs of neighbours at ±k/10 along one axis hold k, for k = 1 to 8: the plane is level, and its height the mean
+    of k by the tricube weights (1 - (k/8)³)³.
+    """
+    k = np.arange(1, 9)
+    known = np.zeros((16, 4))
+    known[:, 0] = np.concatenate([k, -k]) / 10
+    held = np.repeat(np.concatenate([k, k])[:, None], 3, axis=1).astype(float)
+    height = scattered._planes(scattered._tree(known), known, held, np.zeros((1, 4)))[0, 0]
+    weights = [0.994152, 0.953854, 0.849993, 0.669922, 0.431840, 0.193226, 0.035963, 0.0]
+    check_height(height, sum(w * n for w, n in zip(weights, range(1, 9), strict=True)) / sum(weights))
+    must_fail(check_height, height, 4.5)  # as without weights
