@@ -5,14 +5,19 @@ from math import e, sqrt
 
 import numpy as np
 import pytest
-from helpers import compact_material, must_fail
+from helpers import compact_material, complaint, must_fail
 
 from sommerl import BrdfTable, Lattice, TrainOptions, train
+from sommerl.compression.compact.search import CompactOptions
+from sommerl.compression.smrl.file import LONGEST_FILE
 from sommerl.formats import scattered
 from sommerl.formats.scattered import COARSE, to_table
+from sommerl.reflectance.brdf import Brdf
 from sommerl.reflectance.distance import asymmetry, table_metrics
 from sommerl.reflectance.nodes import NodeLattice
+from sommerl.reflectance.origin import check_chain
 from sommerl.reflectance.samples import Samples
+from sommerl.system.errors import OptionError
 
 # Two cells, θ_h = 22.5° and φ_d = 90°: cos θ_i = cos θ_o = cos θ_h cos θ_d. At θ_d = 22.5° and 67.5°, sin θ_d cos θ_d
 # is the same, and what is left of the weights is cos² θ_d: (2 + √2) / 4 = 0.853553 and (2 - √2) / 4 = 0.146447.
@@ -164,3 +169,61 @@ def test_bytes_of_nodes():
 
 def check_bytes(material, memory, paper):
     assert (material.bytes_memory, material.bytes_paper) == (memory, paper)
+
+
+def check_longest(bytes_):
+    assert bytes_ == LONGEST_FILE
+
+
+def test_no_file_is_longer():
+    """2 · 2²² + 24 · 2¹⁶ + 2²⁰ = 8,388,608 + 1,572,864 + 1,048,576, as docs/format.md says."""
+    check_longest(11_010_048)
+    must_fail(check_longest, 11_010_049)
+
+
+class Even(Brdf):
+    """1 everywhere, also where it has no say."""
+
+    name = "even"
+
+    def f_r(self, wi, wo, buffers):
+        one = 0 * wi[2] + 1
+        return one, one, one
+
+
+def check_seen(wi, wo, value):
+    assert Even().eval(wi, wo).tolist() == [value] * 3
+
+
+def test_the_horizon_itself_is_dark():
+    level, up = [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]
+    check_seen(up, up, 1)
+    must_fail(check_seen, up, up, 0)
+    for wi, wo in ((up, level), (level, up), (level, level)):
+        check_seen(wi, wo, 0)
+
+
+@pytest.mark.parametrize("psnr", [20, 50.0, 80])
+def test_targets_within_their_bounds(psnr):
+    assert CompactOptions(target_psnr=psnr).target_psnr == psnr
+    for bad in (19.9, 80.1):
+        with pytest.raises(OptionError, match=f"target_psnr: expected 20 to 80, found {bad}"):
+            CompactOptions(target_psnr=bad)
+    with pytest.raises(OptionError, match="seed: expected 0 to 18446744073709551615, found -1"):
+        CompactOptions(seed=-1)
+
+
+def chain(links):
+    """So many sources, the first without its SHA-256, which is in the file's head."""
+    return [{"kind": "som-man", "name": "x"}, *[{"kind": "som-man", "name": "y", "sha256": ""}] * (links - 1)]
+
+
+def check_links(links, sentence=None):
+    assert complaint(check_chain, chain(links)) == sentence
+
+
+def test_chains_have_1_to_8_links():
+    check_links(1)
+    check_links(8)
+    check_links(9, "made_from: expected a list of 1 to 8 sources, found something else")
+    must_fail(check_links, 9)

@@ -3,6 +3,7 @@ import pytest
 from helpers import must_fail, random_directions
 
 from sommerl import MERL, BrdfTable, Lattice, builtin
+from sommerl.formats import scattered
 from sommerl.formats.scattered import to_table
 from sommerl.plots import coverage
 from sommerl.reflectance.distance import table_metrics
@@ -204,3 +205,57 @@ def test_the_largest_and_the_smallest_values(value):
     table = to_table(Samples(A, B, f_r), name="x")
     assert np.isfinite(table.values).all()
     assert 0 < table.energy_clamped <= 1
+
+
+def check_both_sides(samples, mirrored, expected_wi):
+    found, said = scattered._both_sides(samples)
+    assert said is mirrored
+    assert np.array_equal(found.wi, expected_wi)
+    assert len(found.wo) == len(found.f_r) == len(expected_wi)
+
+
+def test_mirror_images_by_hand():
+    """Three pairs at azimuths 30°, 60° and 0: on one side of the plane of incidence, or in it. The mirror turns y."""
+
+    def turned(*degrees):
+        return np.array([[0.6 * np.cos(np.radians(d)), 0.6 * np.sin(np.radians(d)), 0.8] for d in degrees])
+
+    wi, f_r = turned(0, 0, 0), np.ones((3, 3))
+    one_side = Samples(wi, turned(30, 60, 0), f_r)
+    check_both_sides(one_side, True, np.concatenate([wi, wi * [1, -1, 1]]))
+    assert np.allclose(scattered._both_sides(one_side)[0].wo[3:], turned(-30, -60, 0))
+    both = Samples(wi, turned(30, -60, 0), f_r)
+    check_both_sides(both, False, wi)
+    must_fail(check_both_sides, both, True, np.concatenate([wi, wi]))
+    # Next to the normal, and within half a degree of the plane, there are no sides.
+    check_both_sides(Samples(wi, turned(30, -0.4, 180.4), f_r), True, np.concatenate([wi, wi * [1, -1, 1]]))
+    check_both_sides(Samples(wi * [0.01, 1, 1], turned(30, -60, 0), f_r), True, np.concatenate([wi * [0.01, 1, 1]] * 2))
+
+
+def test_cells_and_energy_of_what_goes_below_zero_by_hand():
+    """One channel at -1, of which the table holds nothing: 1 of 3 is lost, whatever the weights of cells. Or none."""
+    lattice = Lattice(1, 2, 1)
+    values, held = np.ones((1, 2, 1, 3)), np.ones((1, 2, 1, 3))
+    values[..., 0], held[..., 0] = -1, 0
+    cells, energy = scattered._clamped(lattice, values, BrdfTable(held, lattice))
+    assert (cells, energy) == (2, pytest.approx(1 / 3))
+    table = BrdfTable(np.ones((1, 2, 1, 3)), lattice)
+    assert scattered._clamped(lattice, np.ones((1, 2, 1, 3)), table) == (0, 0.0)
+
+
+def check_height(found, by_hand):
+    assert found == pytest.approx(by_hand, rel=1e-4)
+
+
+def test_weights_of_neighbours_by_hand():
+    """Pairs of neighbours at ±k/10 along one axis hold k, for k = 1 to 8: the plane is level, and its height the mean
+    of k by the tricube weights (1 - (k/8)³)³.
+    """
+    k = np.arange(1, 9)
+    known = np.zeros((16, 4))
+    known[:, 0] = np.concatenate([k, -k]) / 10
+    held = np.repeat(np.concatenate([k, k])[:, None], 3, axis=1).astype(float)
+    height = scattered._planes(scattered._tree(known), known, held, np.zeros((1, 4)))[0, 0]
+    weights = [0.994152, 0.953854, 0.849993, 0.669922, 0.431840, 0.193226, 0.035963, 0.0]
+    check_height(height, sum(w * n for w, n in zip(weights, range(1, 9), strict=True)) / sum(weights))
+    must_fail(check_height, height, 4.5)  # as without weights

@@ -7,7 +7,19 @@ import pytest
 from helpers import must_fail, random_directions
 from sampled import MATERIALS, Dim, sampler
 
-from sommerl.sampling.half_vector import CELLS, COLUMNS, ELEVATIONS, LOWEST, ROWS, SLOTS, WHOLE, HalfVectorSampler
+from sommerl.reflectance.brdf import Brdf
+from sommerl.sampling.half_vector import (
+    CELLS,
+    COLUMNS,
+    ELEVATIONS,
+    LOWEST,
+    ROWS,
+    SLOTS,
+    WHOLE,
+    HalfVectorSampler,
+    albedo_at,
+    albedos,
+)
 from sommerl.sampling.half_vector import _mirrored as mirrored
 
 EACH_MATERIAL = pytest.mark.parametrize("material", MATERIALS)
@@ -141,3 +153,25 @@ def test_of_a_black_material_it_is_the_cosine_nearly():
 @pytest.mark.parametrize("cosines", [(0.3, 2), (0, 0.5), (0.2, 0.4)])
 def test_a_material_may_be_black_for_some_viewers(cosines):
     check_tables(HalfVectorSampler.fitted(Dim(*cosines)))
+
+
+class ByViewer(Brdf):
+    """f_r = cos θ_o · (1, ½, 0) / π, which reflects the share cos θ_o · (1, ½, 0) of even light."""
+
+    name = "by viewer"
+
+    def f_r(self, wi, wo, buffers):
+        return wo[2] / np.pi, wo[2] / (2 * np.pi), 0 * wo[2]
+
+
+def check_albedos(table, theta_o):
+    assert np.allclose(table, np.cos(theta_o)[:, None] * [1, 0.5, 0], atol=0.011)
+
+
+def test_albedos_by_hand():
+    """At 0°, 3°, …, 90° to the viewer; the first and the last are taken 0.01 rad from the normal and the horizon."""
+    table = albedos(ByViewer())
+    check_albedos(table, np.radians(np.arange(0, 91, 3)))
+    must_fail(check_albedos, table, np.radians(np.arange(0, 91, 3) - 1))
+    between = np.radians(np.array([0.0, 1.5, 40.0, 61.0, 89.0, 90.0]))
+    check_albedos(np.stack(albedo_at(np.cos(between), table.reshape(-1)), axis=-1), between)
