@@ -1,5 +1,7 @@
 """`sommerl convert`, and the loading of every format by its content."""
 
+import json
+
 import numpy as np
 import pytest
 from helpers import lambertian_table, must_fail, random_directions, run, run_json
@@ -56,12 +58,20 @@ def test_mostly_extrapolated(capsys, tmp_path):
     rows = [(i, 0, o, phi, 1, 1, 1) for i in (5, 15, 30) for o in (5, 15, 30) for phi in range(0, 180, 30)]
     np.savetxt(tmp_path / "x.csv", rows, delimiter=",", header=header)
     assert main(["convert", str(tmp_path / "x.csv"), str(tmp_path / "x.binary")]) == 0
-    assert "warning: most of this material is extrapolated" in capsys.readouterr().out
+    sentence = f"{tmp_path / 'x.csv'}: most of this material is extrapolated"
+    assert capsys.readouterr().err == f"warning: {sentence}\n"
+    assert run_json_warned(capsys, "convert", tmp_path / "x.csv", tmp_path / "y.bsdf") == [sentence]
+
+
+def run_json_warned(capsys, *arguments):
+    status, out, _ = run(capsys, *arguments, "--json")
+    assert status == 0
+    return json.loads(out)["warnings"]
 
 
 def test_names_of_outputs(capsys, tmp_path):
     (tmp_path / "x.bsdf").write_bytes(content())
-    assert compress._outputs([str(tmp_path / "x.bsdf"), "nickel"], tmp_path) == [
+    assert compress._outputs([str(tmp_path / "x.bsdf"), "nickel"], tmp_path, several=True) == [
         tmp_path / "x.smrl",
         tmp_path / "nickel.smrl",
     ]

@@ -104,7 +104,8 @@ def compress(options: CompressArguments) -> dict[str, Any]:
     """Compresses each material. Raises PartlyDone if some of several fail."""
     method = _method(options)
     sources = expanded(options.inputs)
-    outputs = _outputs(options, sources)
+    several = len(sources) > 1 or any(is_several(source) for source in options.inputs)
+    outputs = _outputs(sources, options.output, several=several)
     if len(sources) > 1:
         kept = readable(sources, options.inputs)
         outputs = [output for source, output in zip(sources, outputs, strict=True) if source in kept]
@@ -147,10 +148,8 @@ def _method(options: CompressArguments) -> CompactOptions | TrainOptions:
     return library_options(TrainOptions, options)
 
 
-def _outputs(options: CompressArguments, sources: Sequence[str]) -> list[Path]:
-    """Where each material goes: into a folder if there are several, or if the output is one or has no extension."""
-    output = options.output
-    several = len(sources) > 1 or any(is_several(source) for source in options.inputs)
+def _outputs(sources: Sequence[str], output: Path, *, several: bool) -> list[Path]:
+    """The file for each material: in a folder if there are `several`, or if the output is one or has no extension."""
     if output.suffix.lower() == ".smrl" and not output.is_dir():
         if len(sources) > 1:
             raise OptionError(f"{output}: expected a folder for {len(sources)} inputs, found the name of a file")
