@@ -376,9 +376,9 @@ def test_the_readmes_example_runs(tmp_path, monkeypatch, capsys):
     readme = (Path(__file__).parent.parent / "README.md").read_text()
     example = readme.split("```python\n")[1].split("```")[0]
     monkeypatch.chdir(tmp_path)
-    exec(example.replace("clusters=256", "clusters=16, epochs=1"), {})
+    exec(example.replace("clusters=256", "clusters=16, epochs=1").replace("2700", "400"), {})
     assert (tmp_path / "nickel.smrl").exists()
-    assert len(capsys.readouterr().out.splitlines()) == 2
+    assert len(capsys.readouterr().out.splitlines()) == 3
 
 
 def start(*arguments, **options):

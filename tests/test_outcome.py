@@ -20,7 +20,7 @@ class Silent(Exception):
 
 
 REPORT = "; please report it, with what SOMMERL_DEBUG=1 adds\n"
-UNKNOWN = "error: expected none that Sommerl does not know, found "
+UNKNOWN = "error: something went wrong that Sommerl did not expect: "
 ERRORS = {
     "known": (FormatError("x: expected a, found b"), 1, "error: x: expected a, found b\n"),
     "option": (OptionError("x: expected a, found b"), 2, "error: x: expected a, found b\n"),

@@ -123,4 +123,4 @@ def _unexpected(error: BaseException) -> str:
         text = ""
     text = visible(text if len(text) <= LONGEST else f"{text[:LONGEST]}…")
     found = type(error).__name__ + (f" ({text})" if text else "")
-    return f"expected none that Sommerl does not know, found {found}; please report it, with what {DEBUG}=1 adds"
+    return f"something went wrong that Sommerl did not expect: {found}; please report it, with what {DEBUG}=1 adds"

@@ -121,7 +121,10 @@ def _falloff(sigma: float) -> NDArray[np.float32]:
 
 
 def _learn(learner: Any, cells: int, options: TrainOptions, progress: Progress | None) -> list[float]:
-    """All epochs, or as many as change anything; the quantisation error of each."""
+    """Presents all cells in every epoch, and returns the quantisation error of each epoch.
+
+    Once an epoch changes nothing, neither would the later ones: training ends, and its error stands for theirs.
+    """
     alpha = np.float32(options.alpha)
     errors: list[float] = []
     for epoch in range(options.epochs):
