@@ -23,7 +23,7 @@ from sommerl.plots import lobes, page
 from sommerl.render.images import write_image
 from sommerl.reproduction.tables import FitRow, ImageRow
 from sommerl.system.errors import OptionError
-from sommerl.system.files import atomic_write, check_writable, keeping
+from sommerl.system.files import atomic_write, check_writable, replacing_files
 
 
 def test_a_file_appears_whole_or_not_at_all(tmp_path):
@@ -56,7 +56,7 @@ def test_the_longest_names_work_and_errors_speak_of_the_file_meant(tmp_path):
 
 def test_a_link_stays_a_link(tmp_path):
     (tmp_path / "link").symlink_to(tmp_path / "target")
-    with keeping(overwrite=False):
+    with replacing_files(overwrite=False):
         check_writable(tmp_path / "link")  # and one that leads nowhere yet, to what will be there
         with atomic_write(tmp_path / "link") as out:
             out.write(b"x")
@@ -81,7 +81,7 @@ def test_the_mode_of_a_replaced_file_is_kept(tmp_path):
     for mode in (0o640, 0o666, 0o600):
         path.write_bytes(b"SMRL")
         path.chmod(mode)
-        with keeping(overwrite=False), atomic_write(path) as out:
+        with replacing_files(overwrite=False), atomic_write(path) as out:
             out.write(b"SMRL again")
         assert stat.S_IMODE(path.stat().st_mode) == mode
 
@@ -91,7 +91,7 @@ def test_a_file_that_cannot_be_written_is_not_replaced(tmp_path, monkeypatch):
     path.write_bytes(b"SMRL")
     monkeypatch.setattr(os, "access", lambda path, mode: False)  # as its mode says, which root would not be told
     for overwrite in (False, True):
-        with keeping(overwrite=overwrite), pytest.raises(PermissionError, match="cannot be written"):
+        with replacing_files(overwrite=overwrite), pytest.raises(PermissionError, match="cannot be written"):
             check_writable(path)
 
 
@@ -122,7 +122,7 @@ def written_by_all(folder):
 def check_kept(path):
     """A command does not replace it, and says how it would."""
     before = path.read_bytes()
-    with keeping(overwrite=False):
+    with replacing_files(overwrite=False):
         for write in (check_writable, lambda path: atomic_write(path).__enter__()):
             message = complaint(write, path)
             assert message is not None
@@ -133,7 +133,7 @@ def check_kept(path):
 
 def check_replaced(path):
     try:
-        with keeping(overwrite=False):
+        with replacing_files(overwrite=False):
             check_writable(path)
             with atomic_write(path) as out:
                 out.write(b"new")
@@ -171,7 +171,7 @@ def test_measurements_are_kept_under_any_name_and_also_if_we_wrote_them(tmp_path
     for extension in (".binary", ".BSDF", ".brdf", ".npy", ".npz", ".h5", ".hdf5"):
         (tmp_path / f"z{extension}").write_bytes(b"SMRL")
         check_kept(tmp_path / f"z{extension}")
-    with keeping(overwrite=True):
+    with replacing_files(overwrite=True):
         check_writable(tmp_path / "x.binary")
     (tmp_path / "empty.binary").touch()
     check_replaced(tmp_path / "empty.binary")
@@ -181,7 +181,7 @@ def test_a_file_that_appears_meanwhile_is_kept(tmp_path):
     path = tmp_path / "x.smrl"
 
     def write():
-        with keeping(overwrite=False), atomic_write(path) as out:
+        with replacing_files(overwrite=False), atomic_write(path) as out:
             out.write(b"SMRL new")
             path.write_bytes(b"somebody else's")
 
@@ -205,7 +205,7 @@ def test_pipes_and_devices_are_written_to(tmp_path):
     assert read == [b"content"]
     assert stat.S_ISFIFO(fifo.stat().st_mode)
     (tmp_path / "null.smrl").symlink_to("/dev/null")
-    with keeping(overwrite=False), atomic_write(tmp_path / "null.smrl") as out:
+    with replacing_files(overwrite=False), atomic_write(tmp_path / "null.smrl") as out:
         out.write(b"x")
     assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
 

@@ -13,7 +13,7 @@ from .. import __version__
 from ..formats.registry import listed, readable
 from ..models.builtin import NAMES
 from ..system import threads
-from ..system.files import keeping
+from ..system.files import replacing_files
 from . import compare, completion, compress, convert, demo, factor, fit, info, paper, plot, render
 from .arguments import WritingArguments, read
 from .console import warn
@@ -24,7 +24,7 @@ from .parser import Parser
 DESCRIPTION = """\
 Turns measured reflectance into small material files that render fast and look like the measurement.
 
-A MATERIAL is a file in one of the formats below, told by its content, or the name of a built-in one."""
+A MATERIAL is a file in one of the formats below, recognised by its content, or the name of a built-in one."""
 
 BUILT_IN = "Built-in materials (SGD stand-ins for measured ones):\n  " + "\n  ".join(
     ", ".join(NAMES[i : i + 5]) for i in range(0, len(NAMES), 5)
@@ -70,7 +70,7 @@ def _run(typed: Sequence[str]) -> Mapping[str, Any] | None:
         threads.use(threads.checked(options.threads, threads.OPTION))
     threads.limit()
     overwrite = isinstance(options, WritingArguments) and options.overwrite
-    with warnings.catch_warnings(), keeping(overwrite=overwrite), empty_ones_removed():
+    with warnings.catch_warnings(), replacing_files(overwrite=overwrite), empty_ones_removed():
         warnings.showwarning = _warned
         return found.run(options)
 

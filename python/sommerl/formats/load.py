@@ -1,4 +1,4 @@
-"""Materials by name: a file in any known format, told by its content, or a built-in material."""
+"""Materials by name: a file in any known format, recognised by its content, or a built-in material."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .registry import recognised
 
 
 def load(source: str | Path) -> Brdf:
-    """The material in a file of any known format, told by its content, or the built-in one of that name.
+    """The material in a file of any known format, recognised by its content, or the built-in one of that name.
 
     Of an archive of neural BRDFs, "FILE.npz:NAME" is one; of a file of fits, "FILE.json:MODEL". Raises FormatError for
     a file in no known format, MaterialError for a name that is neither file nor built-in.

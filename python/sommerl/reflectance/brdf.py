@@ -132,7 +132,7 @@ class Brdf(ABC):
         but it is finite. Raises ValueError for other shapes, and for what are not real numbers.
         """
         light, viewer = vectors("eval", wi, wo)
-        known, above = told(light, viewer)
+        known, above = finite_and_above(light, viewer)
         result = np.zeros(light.shape)
         result[~known] = np.nan
         pairs, buffers = (light[above], viewer[above]), self.buffers()
@@ -261,7 +261,7 @@ def _real(caller: str, given: ArrayLike) -> Vectors:
         return array.astype(np.float64)
 
 
-def told(wi: Vectors, wo: Vectors) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def finite_and_above(wi: Vectors, wo: Vectors) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Of pairs of vectors (..., 3): whether all components are finite; and whether, besides, both have z > 0."""
     known = np.asarray((np.isfinite(wi) & np.isfinite(wo)).all(axis=-1))
     return known, known & (wi[..., 2] > 0) & (wo[..., 2] > 0)

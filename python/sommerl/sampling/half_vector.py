@@ -113,7 +113,7 @@ class HalfVectorSampler(Sampler):
         """
         angles = np.asarray(theta, np.float64)
         known = np.isfinite(angles)
-        if ((angles < 0) | (angles > PI / 2)).any():
+        if (known & ((angles < 0) | (angles > PI / 2))).any():
             raise ValueError("albedo: polar angles have to be from 0 to π/2, and some are not")
         found = np.full((angles.size, 3), np.nan)
         for number in np.flatnonzero(known):

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..reflectance.arrays import Array, Triple, split
-from ..reflectance.brdf import Brdf, Buffers, finite, told, vectors
+from ..reflectance.brdf import Brdf, Buffers, finite, finite_and_above, vectors
 
 PI = np.pi
 UP = np.array([0.0, 0.0, 1.0])  # takes the place of directions that are not valid
@@ -87,7 +87,7 @@ class Sampler(ABC):
         Raises ValueError for other shapes, and for values that are not real numbers.
         """
         light, viewer = vectors("pdf", wi, wo)
-        known, above = told(light, viewer)
+        known, above = finite_and_above(light, viewer)
         light, viewer = (np.where(above[..., None], w, UP) for w in (light, viewer))
         with np.errstate(all="ignore"):
             density = finite(np.asarray(self.density(split(light), split(viewer), self.buffers())))

@@ -1,8 +1,8 @@
 """Writing files: no file is ever half-written, and commands do not overwrite files that Sommerl did not write.
 
-Files that Sommerl writes carry a mark (`MARKS`). Within `keeping`, which commands use, an existing file is replaced
-only if it has such a mark and is not of a format in which measurements come (`MEASURED`), unless the user asks for it
-with --overwrite. As a library, Sommerl replaces any file, as `numpy.save` does.
+Files that Sommerl writes carry a mark (`MARKS`). Within `replacing_files`, which commands use, an existing file is
+replaced only if it has such a mark and is not of a format in which measurements come (`MEASURED`), unless the user asks
+for it with --overwrite. As a library, Sommerl replaces any file, as `numpy.save` does.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ _replacing: ContextVar[bool] = ContextVar("replacing", default=True)
 
 
 @contextmanager
-def keeping(*, overwrite: bool) -> Generator[None]:
+def replacing_files(*, overwrite: bool) -> Generator[None]:
     """Within the block, only files that Sommerl wrote may be replaced; with `overwrite`, any file."""
     before = _replacing.set(overwrite)
     try:
@@ -71,7 +71,7 @@ def atomic_write(path: Path) -> Generator[BinaryIO]:
     Until then it has a temporary name in the same folder. An existing file of that name is replaced at the end, and
     the new one gets its permissions. If `path` is a pipe or a device, the bytes are written to it at the end.
     Raises OSError if the file cannot be written, and OptionError if there is a file that must not be replaced (see
-    `keeping`), even if it has appeared in the meantime; that file stays as it is.
+    `replacing_files`), even if it has appeared in the meantime; that file stays as it is.
     """
     target = _target(path)
     if target is None:
