@@ -130,7 +130,7 @@ NAMED = [
     ("fit nickel --samples 1", "--samples: expected 1000 to"),
     ("fit nickel --starts 0", "--starts: expected 1 to"),
     ("fit nickel --lobes 9", "--lobes: expected 1 to 4"),
-    ("fit nickel --model lambertian --lobes 2", "--lobes: expected 1 of lambertian"),
+    ("fit nickel --model lambertian --lobes 2", "--lobes: lambertian is a base itself and has 1 lobe, found 2"),
     ("fit nickel --model wadr", "--model: expected lambertian, "),
     ("factor nickel -o x.fbrdf --terms 0", "--terms: expected 1 to 32"),
     ("paper table1 --samples 1", "--samples: expected 1000 to"),

@@ -145,7 +145,7 @@ def test_data_of_ones_own(capsys, tmp_path):
     assert set(expected("table1")) <= set(NAMES)
     for data, message in (
         (tmp_path / "none", f"error: {tmp_path / 'none'}: expected a folder or an archive of materials, found none\n"),
-        (tmp_path, f"error: {tmp_path}: expected a file blue-metallic-paint with one of .smrl, "),
+        (tmp_path, f"error: {tmp_path}: there is no file blue-metallic-paint in it that ends in one of .smrl, "),
     ):
         status, _, err = run(capsys, "paper", "fig5", "--data", data, "-o", tmp_path)
         assert status == 1

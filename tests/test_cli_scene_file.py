@@ -68,6 +68,7 @@ def test_it_is_what_mitsuba_renders(capsys, tmp_path, scene):
     assert result == {
         "image": str(tmp_path / "x.exr"), "spp": 8, "variant": mitsuba().variant(), "scene": str(scene),
         "size": [12, 10], "channels": ["R", "G", "B"], "files": [], "resumed": False, "warnings": [],
+        "input": str(scene), "materials": [],
     }  # fmt: skip
     expected = np.array(mitsuba().render(own(scene), spp=8, seed=_seed(0, 0)))
     assert np.array_equal(picture(tmp_path / "x.exr"), expected)

@@ -1,6 +1,5 @@
 """What is reported of a material, against numbers that are worked out by hand, and by no function of the package."""
 
-from dataclasses import asdict
 from math import e, sqrt
 
 import numpy as np
@@ -40,11 +39,11 @@ def test_log_error(lattice, weights, changed):
     """The logarithm differs by 1 in one cell: the error is the root of that cell's weight."""
     one, other = np.full((2, *lattice.shape, 3), BLACK)
     other.reshape(2, 3)[changed] = BRIGHTER
-    error = table_metrics(one, other, lattice).log_error_cosine
+    error = table_metrics(one, other, lattice)["log_error_cosine"]
     check(error, sqrt(weights[changed]))
     must_fail(check, error, sqrt(0.5))  # as without solid angles and cosines
     other.reshape(2, 3)[changed, :2] = BLACK  # in one of three channels
-    check(table_metrics(one, other, lattice).log_error_cosine, sqrt(weights[changed] / 3))
+    check(table_metrics(one, other, lattice)["log_error_cosine"], sqrt(weights[changed] / 3))
 
 
 def test_rmse_and_relative_error():
@@ -52,7 +51,7 @@ def test_rmse_and_relative_error():
     one, other = np.zeros((2, *IN_THETA_D.shape, 3))
     one.reshape(6)[:3] = 3, 4, 12
     other.reshape(6)[:] = 3, 4, 9, 0, 4, 0
-    found = asdict(table_metrics(one, other, IN_THETA_D))
+    found = table_metrics(one, other, IN_THETA_D)
     check(found["rmse"], sqrt(25 / 6))
     check(found["relative_error"], 5 / 13)
     must_fail(check, found["relative_error"], 5 / sqrt(3**2 + 4**2 + 9**2 + 4**2))  # of the candidate's length

@@ -114,7 +114,7 @@ def test_one_that_was_never_a_file():
     assert [link["kind"] for link in chain] == ["factored", "source"]
     assert chain[1]["sha256"] == brdf.source.sha256
     table = BrdfTable.of(brdf)
-    assert table.source.sha256 == BrdfTable.sampled(brdf).source_sha256
+    assert table.source.sha256 == BrdfTable.sampled(brdf).source.sha256
 
 
 def test_convert_copies_it(capsys, tmp_path):

@@ -92,7 +92,7 @@ def test_nothing_positive_is_refused():
 def test_an_unknown_interpolation_is_refused(small_table):
     with pytest.raises(MaterialError, match="small: expected nearest or trilinear interpolation, found linear"):
         small_table.with_interpolation("linear")
-    with pytest.raises(MaterialError, match="small: expected nearest or trilinear interpolation, found linear"):
+    with pytest.raises(MaterialError, match="table: expected nearest or trilinear interpolation, found linear"):
         BrdfTable(small_table.values, SMALL, interpolation="linear")
 
 

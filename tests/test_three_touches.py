@@ -2,7 +2,6 @@
 
 import importlib
 import re
-from argparse import Namespace
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,7 +12,8 @@ from helpers import lambertian_table, must_fail, run, run_json
 
 from sommerl import TrainOptions, save, train
 from sommerl.commands import cli
-from sommerl.commands.parser import command
+from sommerl.commands.arguments import Arguments, positional
+from sommerl.commands.parser import add_command
 from sommerl.formats import fits
 from sommerl.formats.format import Format
 from sommerl.formats.registry import FORMATS
@@ -55,12 +55,17 @@ class Plain(CosineSampler):
     name = "plain"
 
 
-def greet(options: Namespace):
+@dataclass(frozen=True, kw_only=True)
+class GreetArguments(Arguments):
+    name: str = positional("NAME", help="who is greeted")
+
+
+def greet(options: GreetArguments):
     return {"greeting": options.name}
 
 
 def greeting(add):
-    command(add, "greet", greet, "Says a name.", "sommerl greet nickel").add_argument("name")
+    add_command(add, "greet", greet, GreetArguments, "Says a name.", "sommerl greet nickel")
 
 
 # The new thing of each kind, by the table that it is a row of.
@@ -155,7 +160,7 @@ def check_table_metric(capsys, folder):
 
 
 def check_command(capsys, folder):
-    assert run_json(capsys, "greet", "nickel") == {"greeting": "nickel"}
+    assert run_json(capsys, "greet", "nickel") == {"greeting": "nickel", "warnings": []}
     assert "    greet     says a name\n" in run(capsys, "--help")[1]
 
 

@@ -43,8 +43,8 @@ def check_near(brdf, worst):
 
 def test_the_source_comes_back_and_better_from_more_nodes(fitter):
     few, more = fitter.fit(300), fitter.fit(1500)
-    assert 240 <= few.nodes.size <= 300
-    assert 1200 <= more.nodes.size <= 1500
+    assert 240 <= few.lattice.size <= 300
+    assert 1200 <= more.lattice.size <= 1500
     check_near(few, 0.03)
     check_near(more, 0.013)
     must_fail(check_near, few, log_error(more))

@@ -45,7 +45,7 @@ def test_so_does_a_comparison(monkeypatch):
     monkeypatch.setattr(compare, "sphere", lambda brdf, *_, **__: brdf)
     monkeypatch.setattr(compare, "render_all", lambda scenes, **_: [shown(scene()) for scene in scenes])
     found = compare_on_sphere(GREY, [DARKER], default_environment(8))[0]
-    check_psnr(found.metrics.psnr_object_db)
+    check_psnr(found.metrics["psnr_object_db"])
     assert [int(image[0, 0, 0]) for image in found.exposed()] == [203, 194]
 
 
