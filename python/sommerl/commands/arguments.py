@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from argparse import ArgumentTypeError, Namespace
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, Field, dataclass, field, fields
 from fractions import Fraction
@@ -29,20 +29,21 @@ def option(
     help: str,
     default: Any = MISSING,
     metavar: str | None = None,
-    choices: Sequence[str] | None = None,
+    choices: Collection[str] | None = None,
     read: Callable[[str], Any] | None = None,
     instead_of: str | None = None,
 ) -> Any:
     """A field that is an option, --like-its-name; one without a default has to be given.
 
-    short: its other names. choices: those of a `Literal` by themselves. read: what makes a value of the text, where the
+    short: its other names. choices: those of a `Literal` by themselves; a table whose names they are, so that new rows
+    are among them. read: what makes a value of the text, where the
     type does not say it. instead_of: names a group of options of which one may be given.
     """
     flags: dict[str, Any] = {"short": short, "help": help, "metavar": metavar, "choices": choices, "read": read}
     return field(default=default, metadata={**flags, "instead_of": instead_of})
 
 
-def positional(metavar: str, *, help: str, default: Any = MISSING, choices: Sequence[str] | None = None) -> Any:
+def positional(metavar: str, *, help: str, default: Any = MISSING, choices: Collection[str] | None = None) -> Any:
     """A field that is an argument without a name; a tuple takes any number, at least one if there is no default."""
     return field(default=default, metadata={"positional": metavar, "help": help, "choices": choices})
 

@@ -23,7 +23,7 @@ class RenderArguments(RenderingArguments):
         default=(),
         help="as many as the scene takes, the rest are the scene's own; or SCENE.xml, a scene of your own",
     )
-    scene: str | None = option(default=None, choices=[*SCENES], help=f"({DEFAULT_SCENE})")
+    scene: str | None = option(default=None, choices=SCENES, help=f"({DEFAULT_SCENE})")
     output: Path = option("-o", metavar="FILE", help="a .png or .exr file")
     against: tuple[Material, ...] = option(
         default=(),
@@ -39,7 +39,7 @@ class RenderArguments(RenderingArguments):
     )
     sampler: str | None = option(
         default=None,
-        choices=[*SAMPLERS],
+        choices=SAMPLERS,
         help=f"how directions to the light are drawn; all give the same image, with more or less noise ({OURS.name})",
     )
     variant: str | None = option(
