@@ -36,8 +36,8 @@ def option(
     """A field that is an option, --like-its-name; one without a default has to be given.
 
     short: its other names. choices: those of a `Literal` by themselves; a table whose names they are, so that new rows
-    are among them. read: what makes a value of the text, where the
-    type does not say it. instead_of: names a group of options of which one may be given.
+    are among them. read: what makes a value of the text, where the type does not say it. instead_of: names a group of
+    options of which one may be given.
     """
     flags: dict[str, Any] = {"short": short, "help": help, "metavar": metavar, "choices": choices, "read": read}
     return field(default=default, metadata={**flags, "instead_of": instead_of})
