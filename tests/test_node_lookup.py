@@ -219,7 +219,10 @@ def check_sees_changes(prepare):
 
 def test_a_prepared_lookup_sees_changes():
     check_sees_changes(_core.NodeLookup)
-    copies = lambda *given: _core.NodeLookup(*given[:4], *map(np.copy, given[4:8]), given[8])  # noqa: E731
+
+    def copies(*given):
+        return _core.NodeLookup(*given[:4], *map(np.copy, given[4:8]), given[8])
+
     must_fail(check_sees_changes, copies)
 
 

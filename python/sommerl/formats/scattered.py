@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..reflectance.arrays import Triple, split
+from ..reflectance.brdf import LARGEST
 from ..reflectance.cells import MERL, Lattice
 from ..reflectance.distance import LOG_FLOOR, energy_share
 from ..reflectance.half_diff import directions, half_diff
@@ -34,7 +35,6 @@ MOST_HELD_OUT = 5000
 SAME = 1e-4  # samples whose coordinates agree to that are one, measured several times
 IN_PLANE = np.radians(0.5)  # azimuths between 0 and this, or this and π, lie on neither side of the plane of incidence
 MOST_SAMPLES = 2_000_000
-LARGEST = float(np.finfo(np.float32).max)  # that a table holds
 
 
 class ScatteredTable(BrdfTable):

@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from copy import copy
+from dataclasses import asdict
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
@@ -87,8 +88,7 @@ class Brdf(ABC):
             name=self.name,
             bytes_memory=self.bytes_memory,
             source_sha256=self.source.sha256 or None,
-            cells_clamped=self.counts.cells_clamped,
-            energy_clamped=self.counts.energy_clamped,
+            **asdict(self.counts),
             made_from=[dict(link) for link in self.source.chain()] or None,
             measured_against=measured_against(self),
             facts=facts or None,
