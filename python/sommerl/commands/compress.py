@@ -16,7 +16,6 @@ from ..formats.load import load, load_table
 from ..reflectance.brdf import Brdf
 from ..reflectance.distance import table_metrics
 from ..reflectance.info import Counts
-from ..reflectance.metric import decibels
 from ..reflectance.table import BrdfTable
 from ..render.compress import compress as compressed
 from ..system.errors import OptionError, SommerlError
@@ -27,7 +26,7 @@ from .folders import make_folder
 from .inputs import expanded, is_several, readable, stem
 from .outcome import PartlyDone
 from .parser import add_command
-from .rows import fact_rows, origin_rows, table_rows
+from .rows import changed_rows, fact_rows, judged_rows, origin_rows, table_rows
 
 DEFAULTS = TrainOptions()
 METRICS_DIGITS = 6  # so that the file does not hold the last bits of a machine's sums
@@ -61,7 +60,7 @@ class CompressArguments(WritingArguments):
         default=None,
         metavar="DB",
         instead_of="target",
-        help=f"compact: the smallest file of at least that quality on a rendered sphere ({DEFAULT_PSNR:g})",
+        help=f"compact: the smallest file of at least that PSNR on a sphere in soft light ({DEFAULT_PSNR:g})",
     )
     clusters: int = option(
         default=DEFAULTS.clusters, metavar="M", help="paper: the number of entries in the palette (%(default)s)"
@@ -184,7 +183,7 @@ def compact_one(source: str, brdf: Brdf, output: Path, options: CompactOptions, 
     material, report = fitted(brdf, options)
     written = smrl.save(material, output)
     result = answers.described(source, material, written)
-    result |= {"options": asdict(options), "psnr_object_db": report.psnr_db}
+    result |= {"options": asdict(options), **report.metrics, "psnr_object_db": report.metrics["psnr_soft_db"]}
     counts = brdf.counts
     result |= {"seconds": report.seconds, "output": str(output), **asdict(counts)}
     result |= dict.fromkeys(("epochs", "quantisation_error", "units_dropped"))
@@ -206,7 +205,7 @@ def trained(table: BrdfTable, options: TrainOptions) -> tuple[SomManBrdf, TrainR
     metrics = table_metrics(table.values, material.values, table.lattice)
     measured = metrics | {"quantisation_error": report.quantisation_error[-1]}
     material.metrics = {name: _rounded(value) for name, value in measured.items()}
-    facts = table.facts | (asdict(table.counts) if table.cells_clamped else {})
+    facts = table.facts | {name: value for name, value in asdict(table.counts).items() if value}
     if facts:
         material.options["source_facts"] = {name: _rounded(value) for name, value in facts.items()}
     return material, report
@@ -236,10 +235,8 @@ def compact_rows(material: SomManBrdf, bytes_disk: int, report: CompactReport, c
     rows = {
         "nodes": str(material.lattice.size),
         "palette": f"{material.clusters - len(material.lut)} gains, {len(material.lut)} shapes",
-        "PSNR, object, on a sphere": decibels(report.psnr_db) if report.psnr_db is not None else "not measured",
+        **judged_rows(report.metrics),
         "size in memory": console.size(material.bytes_memory),
         "size on disk": console.size(bytes_disk),
     }
-    if counts.cells_clamped:
-        rows |= fact_rows(asdict(counts))
-    return rows | origin_rows(material) | {"time": f"{report.seconds:.1f} s"}
+    return rows | changed_rows(counts) | origin_rows(material) | {"time": f"{report.seconds:.1f} s"}

@@ -24,7 +24,7 @@ from .arguments import Material, WritingArguments, byte_count, named_as_typed, o
 from .checks import check_output
 from .compress import compact_one, compress_one, fitted, trained
 from .parser import add_command
-from .rows import clamped_text, fact_rows
+from .rows import changed_rows, fact_rows
 
 MOSTLY = 0.5
 
@@ -74,9 +74,10 @@ def convert(options: ConvertArguments) -> dict[str, Any]:
         result = {"input": options.input, "name": written.name, "output": str(output), "bytes_disk": size}
         result |= asdict(counts)
         if not options.json:
-            told = f", cells clamped to 0: {clamped_text(counts)}" if counts.cells_clamped else ""
             written_as = "through a pipe" if size is None else console.size(size)
-            console.say(f"{written.name} → {output} ({written_as}{told})")
+            console.say(f"{written.name} → {output} ({written_as})")
+            for name, value in changed_rows(counts).items():
+                console.say(f"  {name}: {value}")
     if not options.json:
         _print_report(report | {"facts": {}} if "epochs" in result else report)
     return answers.of_materials([result | report])
