@@ -224,7 +224,7 @@ def test_what_was_clamped_or_changed_is_written_anew(tmp_path):
     source = tmp_path / "a.binary"
     source.write_bytes(np.array(stored.shape[1:], "<i4").tobytes() + stored.tobytes())
     table = merl.read(source)
-    assert table.cells_clamped == 1
+    assert table.counts.cells_clamped == 1
     table.values[3, 4, 5] *= 2
     merl.write(table, tmp_path / "b.binary")
     again = np.frombuffer((tmp_path / "b.binary").read_bytes(), "<f8", offset=12).reshape(stored.shape)

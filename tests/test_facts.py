@@ -60,9 +60,9 @@ def test_rmse_and_relative_error():
 def test_cells_and_energy_clamped():
     """One cell of two holds -1, NaN and 3: of 3 · 0.853553 + 4 · 0.146447, the 1 · 0.146447 is lost."""
     table = BrdfTable([[[[1, 1, 1]], [[-1, np.nan, 3]]]], IN_THETA_D)
-    assert table.cells_clamped == 1
-    check(table.energy_clamped, 0.0465435)
-    must_fail(check, table.energy_clamped, 1 / 7)  # as without weights
+    assert table.counts.cells_clamped == 1
+    check(table.counts.energy_clamped, 0.0465435)
+    must_fail(check, table.counts.energy_clamped, 1 / 7)  # as without weights
 
 
 def test_asymmetry():

@@ -170,7 +170,7 @@ def test_scipy_is_asked_for_by_a_sentence(monkeypatch):
 
 
 def check_counted(table, cells, energy):
-    assert (table.cells_clamped, table.energy_clamped) == (cells, pytest.approx(energy, abs=1e-6))
+    assert (table.counts.cells_clamped, table.counts.energy_clamped) == (cells, pytest.approx(energy, abs=1e-6))
 
 
 def test_what_goes_below_zero_is_counted():
@@ -185,8 +185,8 @@ def test_what_goes_below_zero_is_counted():
     few = np.where((A[:, 2] > 0.95)[:, None], -f_r, f_r)
     table = to_table(Samples(A, B, few), name="x")
     assert table.facts["samples_negative"] == (A[:, 2] > 0.95).sum()
-    assert 0 < table.cells_clamped < above / 2
-    assert 0 < table.energy_clamped < 0.2
+    assert 0 < table.counts.cells_clamped < above / 2
+    assert 0 < table.counts.energy_clamped < 0.2
 
 
 @pytest.mark.parametrize("value", [1e39, -1e39, 1e308])
@@ -204,7 +204,7 @@ def test_the_largest_and_the_smallest_values(value):
     f_r[::5, 2] = value
     table = to_table(Samples(A, B, f_r), name="x")
     assert np.isfinite(table.values).all()
-    assert 0 < table.energy_clamped <= 1
+    assert 0 < table.counts.energy_clamped <= 1
 
 
 def check_both_sides(samples, mirrored, expected_wi):
