@@ -85,7 +85,7 @@ class Quantised:
 
     def palette(self, lattice: NodeLattice) -> Any:
         """The core's object for these palettes on a lattice, which measures and writes streams."""
-        return _core.NodePalette(*lattice.axes(), self.gains.tolist(), self.shapes.tolist())
+        return _core.NodePalette(*lattice.axes(), self.gains.tolist(), self.shapes.tolist(), **lattice.folds)
 
     def stream(self, lattice: NodeLattice) -> bytes:
         """The stream of a file. The entries have to be `ordered`.
