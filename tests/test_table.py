@@ -49,22 +49,36 @@ def test_values_that_no_measurement_has_are_clamped_and_counted():
     values[~SMALL.above_horizon] = -1
     table = BrdfTable(values, SMALL)
     assert table.counts.cells_clamped == 2
-    assert table.values[0, 0, :3].tolist() == [[0, 1, 1], [0, 0, 1], [1, 1, 1]]
+    # The luminance of (-1, 1, 1) is 0.5748: moved towards that grey by 1 / 1.5748, its red is 0.
+    moved = 1 - 0.4252 / 1.5748
+    assert np.allclose(table.values[0, 0, :3], [[0, moved, moved], [0, 0, 1], [1, 1, 1]], rtol=1e-12)
     assert (table.values >= 0).all()
 
 
-def share_by_hand(values, lattice, changed):
+def held_by_hand(colour):
+    """A colour as a table holds it, channel by channel."""
+    finite = [x if abs(x) <= np.finfo(np.float32).max else 0.0 for x in colour]
+    grey = 0.2126 * finite[0] + 0.7152 * finite[1] + 0.0722 * finite[2]
+    if min(finite) >= 0:
+        return finite
+    if grey <= 0:
+        return [0.0, 0.0, 0.0]
+    return [grey + (x - grey) * grey / (grey - min(finite)) for x in finite]
+
+
+def share_by_hand(values, lattice):
     """The sums of `distance.energy_share`, cell by cell."""
-    lost = all_ = 0.0
+    moved = all_ = 0.0
     theta_h, theta_d, _ = lattice.angles()
     cos_i, cos_o = lattice.cosines()
     for at in np.ndindex(*lattice.shape):
         if min(cos_i[at], cos_o[at]) > 1e-12:
             solid = np.sin(theta_h[at]) * np.sqrt(theta_h[at]) * np.sin(theta_d[at]) * np.cos(theta_d[at])
-            for channel in values[at][np.isfinite(values[at])]:
-                all_ += solid * cos_i[at] * cos_o[at] * abs(channel)
-                lost += solid * cos_i[at] * cos_o[at] * abs(channel) * changed(channel)
-    return lost / all_
+            for before, after in zip(values[at], held_by_hand(values[at]), strict=True):
+                if np.isfinite(before):
+                    all_ += solid * cos_i[at] * cos_o[at] * abs(before)
+                    moved += solid * cos_i[at] * cos_o[at] * abs(before - after)
+    return moved / all_
 
 
 def check_energy(values, lattice, by_hand):
@@ -76,8 +90,7 @@ def test_what_is_clamped_is_counted_by_its_share_of_the_energy(scale):
     values = np.random.default_rng(0).normal(size=(*SMALL.shape, 3)) * min(scale, 1e30)
     values[3, 2, 1] = np.nan, np.inf, -np.inf
     values[2, 2, 2, 0] = scale
-    largest = np.finfo(np.float32).max
-    by_hand = share_by_hand(values, SMALL, lambda value: not 0 <= value <= largest)
+    by_hand = share_by_hand(values, SMALL)
     check_energy(values, SMALL, by_hand)
     must_fail(check_energy, values, SMALL, 0.99 * by_hand)
     assert BrdfTable(np.abs(np.nan_to_num(values, posinf=0, neginf=0)) / scale, SMALL).counts.energy_clamped == 0

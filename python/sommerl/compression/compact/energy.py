@@ -1,7 +1,7 @@
 """Keeps a compact material from reflecting more than it receives, or than its source does.
 
 A lattice is fitted to reflectances and not to their integrals, so that a source with an albedo near 1 may come out
-brighter than that, mostly for viewers near grazing.
+brighter than that, mostly for viewers near grazing. Then the values to be quantised are made darker there.
 """
 
 from __future__ import annotations
@@ -35,28 +35,17 @@ class EnergyBound:
         return np.ones(len(ANGLES)) if within else np.minimum(1.0, AIM * (self._most / found).min(axis=-1))
 
 
-def darkened(gains: Floats, gain_index: NDArray[np.uint16], lattice: NodeLattice, factors: Floats) -> NDArray[np.uint16]:
-    """Other gains for the nodes that are seen from where `factors` are below 1: of each, the largest entry that is as
-    much darker, or the next smaller one at least.
-
-    gains: increasing; gain_index: of the nodes; factors: as from `EnergyBound`, to be reached by f_r.
+def at_nodes(factors: Floats, lattice: NodeLattice) -> Floats:
+    """The factors for a lattice's nodes, (nodes): that of the viewer's angle, and on a reciprocal lattice of the light's
+    if that is smaller. factors: as from `EnergyBound`.
     """
     wi, wo = _node_directions(lattice)
-    by_node = _at(factors, wo)
-    if lattice.reciprocal:
-        by_node = np.minimum(by_node, _at(factors, wi))
-    now = gains[gain_index]
-    wanted = np.searchsorted(gains, now * np.cbrt(by_node), side="right") - 1
-    least = int(np.searchsorted(gains, 0.0))  # a gain below 0 is no darker
-    lower = np.clip(np.minimum(wanted, gain_index.astype(np.int64) - 1), min(least, len(gains) - 1), None)
-    return np.where((by_node < 1.0) & (now > 0), lower, gain_index).astype(np.uint16)
+    seen = _at(factors, wo)
+    return np.minimum(seen, _at(factors, wi)) if lattice.reciprocal else seen
 
 
 def _at(factors: Floats, w: Triple) -> Floats:
-    """The factors for directions to a viewer: of the two angles beside it, the smaller one."""
-    theta = np.arctan2(np.hypot(w[0], w[1]), w[2])
-    upper = np.clip(np.searchsorted(ANGLES, theta), 1, len(ANGLES) - 1)
-    return np.minimum(factors[upper - 1], factors[upper])
+    return np.interp(np.arctan2(np.hypot(w[0], w[1]), w[2]), ANGLES, factors)
 
 
 def _node_directions(lattice: NodeLattice) -> tuple[Triple, Triple]:

@@ -328,7 +328,7 @@ def _weight(x: Array, y: Array, z: Array, wi: Triple, wo: Triple) -> Array:
     theta_h, theta_d, _ = angles_at(x, y, z)
     steps = np.where(x < KNEE, 1 / BELOW, 1 / ABOVE)
     solid = np.sqrt(theta_h) * np.sin(theta_h) * np.sin(theta_d) * np.cos(theta_d) * steps
-    return solid**SOLID_POWER * (np.maximum(wi[2], 0.0) * np.maximum(wo[2], 0.0)) ** COSINE_POWER
+    return solid**SOLID_POWER * damped(wi, wo) ** COSINE_POWER
 
 
 def folds_of(brdf: Brdf) -> dict[str, bool]:

@@ -9,7 +9,7 @@ use it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -63,6 +63,11 @@ class Problem:
     right: Floats
     best: Floats
     error: float
+
+    def scaled(self, factors: Floats) -> Problem:
+        """The problem whose values of least error are these times a factor for each node, (nodes)."""
+        best = self.best * factors[:, None]
+        return replace(self, right=np.ascontiguousarray(self.system @ best), best=best)
 
     def excess(self, values: Floats) -> float:
         """By how much the error of other values (nodes, 3) exceeds the least error."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import isfinite
 from operator import index
 
@@ -22,7 +22,7 @@ from ..material import SomManBrdf
 from ..palette import GainsAndShapes
 from ..smrl import file
 from ..smrl.codes import gain_values, shape_values
-from .energy import EnergyBound, darkened
+from .energy import EnergyBound, at_nodes
 from .lattice_fit import LARGEST, SMALLEST, Fitter
 from .quantise import Problem, Quantised, quantise
 
@@ -62,7 +62,7 @@ USUAL = (
 # to 1.5 dB, and 1.4 times as many gain at most 0.2 dB (nickel, irid_flake_paint1).
 GAINS, SHAPES = 3.4, 2.6
 MOST_ENTRIES = 1024  # of a palette in a file (docs/format.md)
-DARKENINGS = 4  # of nodes, before a material that reflects too much is made darker as a whole
+DARKENINGS = 3  # of nodes, before a material that reflects too much is made darker as a whole
 
 
 @dataclass(frozen=True)
@@ -187,8 +187,7 @@ class Compressor:
                 f"{self._brdf.name}: its name and source take {head} bytes of the {size} asked for; ask for at least "
                 f"{2 * head} bytes"
             )
-        found, stream = quantise(problem, gains, shapes, size - head, seed=self._seed)
-        material, stream = self._bounded(problem, found, stream, size - head)
+        material, stream = self._bounded(problem, gains, shapes, size - head)
         error = problem.error + problem.excess(material.node_values)
         # Rounded, so that rounding errors, which differ between machines, do not decide between candidates.
         quality = round(self._quality(material), 3) if self._quality else -error
@@ -197,29 +196,21 @@ class Compressor:
         self._step()
         return (quality if written <= size else -math.inf), material
 
-    def _bounded(self, problem: Problem, found: Quantised, stream: bytes, room: int) -> tuple[SomManBrdf, bytes]:
-        """The material of palettes and indices, made darker where it reflects too much; and its stream.
+    def _bounded(self, problem: Problem, gains: int, shapes: int, room: int) -> tuple[SomManBrdf, bytes]:
+        """The quantised material that does not reflect too much, and its stream, of `room` bytes if possible.
 
-        As long as the stream has `room`, nodes that are seen from there take smaller gains. What is then still too
-        bright is made darker as a whole, which takes no room.
+        As long as it does, the values at the nodes that are seen from there are made darker, and quantised again. What
+        is then still too bright is made darker as a whole.
         """
-        material = self._material(problem, found, self._fitter.scale)
-        factors = self._bound.factors(material)
-        for _ in range(DARKENINGS):
-            if factors.min() == 1.0:
-                break
-            darker = replace(
-                found, gain_index=darkened(gain_values(found.gains), found.gain_index, problem.lattice, factors)
-            ).ordered()
-            other = darker.stream(problem.lattice)
-            if len(other) > max(room, len(stream)):
-                break
-            found, stream = darker, other
+        factors = np.ones(1)
+        for _ in range(1 + DARKENINGS):
+            found, stream = quantise(problem, gains, shapes, room, seed=self._seed)
             material = self._material(problem, found, self._fitter.scale)
             factors = self._bound.factors(material)
-        if factors.min() < 1.0:
-            material = self._material(problem, found, self._fitter.scale * float(factors.min()))
-        return material, stream
+            if factors.min() == 1.0:
+                return material, stream
+            problem = problem.scaled(np.cbrt(at_nodes(factors, problem.lattice)))
+        return self._material(problem, found, self._fitter.scale * float(factors.min())), stream
 
     def _material(self, problem: Problem, found: Quantised, scale: float) -> SomManBrdf:
         return SomManBrdf(
