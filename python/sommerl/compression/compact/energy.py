@@ -14,10 +14,11 @@ from ...reflectance.brdf import Brdf
 from ...reflectance.half_diff import directions
 from ...reflectance.nodes import NodeLattice, angles_at
 
-ANGLES = np.radians((0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 77.0, 82.0, 85.0, 87.0, 88.0, 88.8, 89.2, 89.5))  # of viewers
-POINTS = 6  # along each side of a sampler's cell, of the albedos' quadrature
+# Of viewers, closer together where albedos change fastest
+ANGLES = np.radians((0, 10, 20, 30, 40, 50, 60, 68, 74, 78, 81, 84, 86, 87, 88, 88.5, 89, 89.3, 89.5))
+POINTS = 8  # along each side of a sampler's cell, of the albedos' quadrature
 ALLOWED = 1.02  # times the source's albedo, or 1 if that is more
-AIM = 0.997  # of what is allowed, since quadrature and interpolation between ANGLES are not exact
+AIM = 0.99  # of what is allowed, since quadrature and interpolation between ANGLES are not exact
 
 Floats = NDArray[np.float64]
 

@@ -47,4 +47,4 @@ class FittedTable(Brdf):
 
     def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
         y = self.lattice.lookup(wi, wo, "trilinear", buffers, lambda node: gather3(buffers["values"], node))
-        return from_cube_root(y, wi, wo, buffers["scale"], self._signed)
+        return from_cube_root(y, wi, wo, buffers["scale"], self._signed, smooth=True)

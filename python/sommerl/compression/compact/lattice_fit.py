@@ -154,7 +154,7 @@ class Fitter:
         f_r = np.zeros((*wi[0].shape, 3))
         seen = np.minimum(wi[2], wo[2]) > SMALLEST_COSINE
         f_r[seen] = self._brdf.eval(*(np.stack([c[seen] for c in w], axis=-1) for w in (wi, wo)))
-        return wi, wo, f_r * damped(wi, wo)[..., None]
+        return wi, wo, f_r * damped(wi, wo, smooth=True)[..., None]
 
     def _grid(self, x: Array, y: Array, z: Array) -> _Grid:
         return self._scaled(x, y, z, *self._source(x, y, z))
@@ -175,7 +175,7 @@ class Fitter:
         self._places = x[above], y[above], z[above]
         wi, wo = ((w[0][above], w[1][above], w[2][above]) for w in (wi, wo))
         f_r = self._brdf.eval(np.stack(wi, axis=-1), np.stack(wo, axis=-1))
-        self._targets = np.cbrt(f_r * (damped(wi, wo) / self.scale)[:, None])
+        self._targets = np.cbrt(f_r * (damped(wi, wo, smooth=True) / self.scale)[:, None])
         weight = _weight(*self._places, wi, wo)
         self._weights = weight / weight.mean()
 
@@ -328,7 +328,7 @@ def _weight(x: Array, y: Array, z: Array, wi: Triple, wo: Triple) -> Array:
     theta_h, theta_d, _ = angles_at(x, y, z)
     steps = np.where(x < KNEE, 1 / BELOW, 1 / ABOVE)
     solid = np.sqrt(theta_h) * np.sin(theta_h) * np.sin(theta_d) * np.cos(theta_d) * steps
-    return solid**SOLID_POWER * damped(wi, wo) ** COSINE_POWER
+    return solid**SOLID_POWER * damped(wi, wo, smooth=True) ** COSINE_POWER
 
 
 def folds_of(brdf: Brdf) -> dict[str, bool]:

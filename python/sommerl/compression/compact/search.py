@@ -209,12 +209,13 @@ class Compressor:
             factors = self._bound.factors(material)
             if factors.min() == 1.0:
                 return material, stream
-            problem = problem.scaled(np.cbrt(at_nodes(factors, problem.lattice)))
+            # Squared, since neighbours that are not as bright keep up what is seen between them.
+            problem = problem.scaled(np.cbrt(at_nodes(factors**2, problem.lattice)))
         return self._material(problem, found, self._fitter.scale * float(factors.min())), stream
 
     def _material(self, problem: Problem, found: Quantised, scale: float) -> SomManBrdf:
         return SomManBrdf(
-            GainsAndShapes(gain_values(found.gains), shape_values(found.shapes), scale, signed=self._brdf.signed),
+            GainsAndShapes(gain_values(found.gains), shape_values(found.shapes), scale, self._brdf.signed, smooth=True),
             np.stack([found.gain_index, found.shape_index]),
             problem.lattice,
             name=self._brdf.name,
