@@ -63,11 +63,13 @@ def arguments(lattice):
 
 def in_numpy(lattice, signed=False):
     gains, shapes, gain, shape = factors(lattice)
-    return SomManBrdf(GainsAndShapes(gains, shapes, SCALE, signed), np.stack([gain, shape]), lattice, name="made up")
+    return SomManBrdf(
+        GainsAndShapes(gains, shapes, SCALE, signed, lattice.mirrored), np.stack([gain, shape]), lattice, name="made up"
+    )
 
 
 def lookup(lattice, signed=False):
-    return _core.NodeLookup(*arguments(lattice), **lattice.folds, signed=signed)
+    return _core.NodeLookup(*arguments(lattice), **lattice.folds, signed=signed, smooth=lattice.mirrored)
 
 
 def found(name, wi, wo, simd=None, threads=None):

@@ -12,12 +12,14 @@ from ..compression.material import SomManBrdf
 from ..compression.paper.options import Order, Rule, Topology, TrainOptions
 from ..compression.paper.train import TrainReport, train
 from ..compression.smrl import file as smrl
-from ..formats.load import load, load_table
+from ..formats.load import load
 from ..reflectance.brdf import Brdf
 from ..reflectance.distance import table_metrics
 from ..reflectance.info import Counts
+from ..reflectance.reciprocal import reciprocal as averaged
 from ..reflectance.table import BrdfTable
 from ..render.compress import compress as compressed
+from ..render.judge import Judge
 from ..system.errors import OptionError, SommerlError
 from . import answers, console
 from .arguments import Material, WritingArguments, byte_count, flag, library_options, option, positional
@@ -61,6 +63,9 @@ class CompressArguments(WritingArguments):
         metavar="DB",
         instead_of="target",
         help=f"compact: the smallest file of at least that PSNR on a sphere in soft light ({DEFAULT_PSNR:g})",
+    )
+    reciprocal: bool = option(
+        default=False, help="compact: the mean of both orders of the directions, which a file holds with fewer nodes"
     )
     clusters: int = option(
         default=DEFAULTS.clusters, metavar="M", help="paper: the number of entries in the palette (%(default)s)"
@@ -113,7 +118,7 @@ def compress(options: CompressArguments) -> dict[str, Any]:
     failed = 0
     for source, output in zip(sources, outputs, strict=True):
         try:
-            results.append(_compressed(source, output, method, options.json))
+            results.append(_compressed(source, output, method, options))
         except SommerlError as error:  # a target out of one material's reach is no reason to leave out the others
             if len(sources) == 1:
                 raise
@@ -126,10 +131,12 @@ def compress(options: CompressArguments) -> dict[str, Any]:
     return answer
 
 
-def _compressed(source: str, output: Path, method: CompactOptions | TrainOptions, quiet: bool) -> dict[str, Any]:
+def _compressed(
+    source: str, output: Path, method: CompactOptions | TrainOptions, options: CompressArguments
+) -> dict[str, Any]:
     if isinstance(method, CompactOptions):
-        return compact_one(source, load(source), output, method, quiet)
-    return compress_one(source, load_table(source), output, method, quiet)
+        return compact_one(source, load(source), output, method, options.json, reciprocal=options.reciprocal)
+    return compress_one(source, load(source), output, method, options.json)
 
 
 def _method(options: CompressArguments) -> CompactOptions | TrainOptions:
@@ -141,8 +148,8 @@ def _method(options: CompressArguments) -> CompactOptions | TrainOptions:
             if each.name != "seed" and getattr(options, each.name) != getattr(DEFAULTS, each.name):
                 raise OptionError(f"{flag(each.name)}: expected --preset paper, found compact")
         return library_options(CompactOptions, options)
-    for name in ("target_size", "target_psnr"):
-        if getattr(options, name) is not None:
+    for name in ("target_size", "target_psnr", "reciprocal"):
+        if getattr(options, name):
             raise OptionError(f"{flag(name)}: expected --preset compact, found paper")
     return library_options(TrainOptions, options)
 
@@ -165,26 +172,31 @@ def _outputs(sources: Sequence[str], output: Path, *, several: bool) -> list[Pat
     return outputs
 
 
-def compress_one(source: str, table: BrdfTable, output: Path, options: TrainOptions, quiet: bool) -> dict[str, Any]:
-    """Compresses a table by the preset paper into a file, and shows what came of it unless `quiet`.
+def compress_one(source: str, brdf: Brdf, output: Path, options: TrainOptions, quiet: bool) -> dict[str, Any]:
+    """Compresses a material as a table by the preset paper into a file, and shows what came of it unless `quiet`.
 
-    source: where the table is from, as it was given.
+    source: where the material is from, as it was given.
     """
-    material, report = trained(table, options)
+    material, report = trained(BrdfTable.of(brdf), options)
     written = smrl.save(material, output)
-    result = answers.described(source, material, written) | asdict(report)
+    metrics = Judge(brdf).metrics(material)
+    result = answers.described(source, material, written) | asdict(report) | metrics
     if not quiet:
-        console.print_rows(f"{material.name} → {output}", compression_rows(material, written, report))
+        console.print_rows(
+            f"{material.name} → {output}", judged_rows(metrics) | compression_rows(material, written, report)
+        )
     return result | {"epochs": options.epochs, "output": str(output)}
 
 
-def compact_one(source: str, brdf: Brdf, output: Path, options: CompactOptions, quiet: bool) -> dict[str, Any]:
-    """The same by the preset compact, for a material of any kind."""
-    material, report = fitted(brdf, options)
+def compact_one(
+    source: str, brdf: Brdf, output: Path, options: CompactOptions, quiet: bool, *, reciprocal: bool = False
+) -> dict[str, Any]:
+    """The same by the preset compact. reciprocal: see `render.compress`."""
+    material, report = fitted(brdf, options, reciprocal=reciprocal)
     written = smrl.save(material, output)
     result = answers.described(source, material, written)
     result |= {"options": asdict(options), **report.metrics, "psnr_object_db": report.metrics["psnr_soft_db"]}
-    counts = brdf.counts
+    counts = averaged(brdf).counts if reciprocal else brdf.counts
     result |= {"seconds": report.seconds, "output": str(output), **asdict(counts)}
     result |= dict.fromkeys(("epochs", "quantisation_error", "units_dropped"))
     if not quiet:
@@ -192,10 +204,10 @@ def compact_one(source: str, brdf: Brdf, output: Path, options: CompactOptions, 
     return result
 
 
-def fitted(brdf: Brdf, options: CompactOptions) -> tuple[SomManBrdf, CompactReport]:
-    """Compresses by the preset compact under a progress bar."""
+def fitted(brdf: Brdf, options: CompactOptions, *, reciprocal: bool = False) -> tuple[SomManBrdf, CompactReport]:
+    """Compresses by the preset compact under a progress bar. reciprocal: see `render.compress`."""
     with console.progress(f"compressing {brdf.name}") as advance:
-        return compressed(brdf, **asdict(options), progress=advance)
+        return compressed(brdf, **asdict(options), reciprocal=reciprocal, progress=advance)
 
 
 def trained(table: BrdfTable, options: TrainOptions) -> tuple[SomManBrdf, TrainReport]:

@@ -111,13 +111,15 @@ class GainsAndShapes(Palette):
     """The palette of the preset `compact`, for nodes: gain times shape is a value y in the cube-root domain.
 
     gains: (G,). lut: the shapes, (S, 3), whose mean is 1. scale: of the domain; see `nodes.from_cube_root`. signed:
-    whether blended values below 0 give negative reflectances, and not 0. smooth: see `nodes.damped`. index: unsigned, (2, nodes): of each node, the
-    number of its gain and of its shape.
+    whether blended values below 0 give negative reflectances, and not 0. smooth: see `nodes.damped`. index: unsigned,
+    (2, nodes): of each node, the number of its gain and of its shape.
     """
 
     domain = "cube-root"
 
-    def __init__(self, gains: ArrayLike, shapes: ArrayLike, scale: float, signed: bool = False, smooth: bool = False) -> None:
+    def __init__(
+        self, gains: ArrayLike, shapes: ArrayLike, scale: float, signed: bool = False, smooth: bool = False
+    ) -> None:
         self.gains = np.array(gains, np.float64)
         self.lut = np.array(shapes, np.float64)
         self.scale = float(np.float32(scale))  # as a file holds it

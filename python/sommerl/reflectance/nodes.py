@@ -150,8 +150,8 @@ def angles_at(x: Array, y: Array, z: Array, reciprocal: bool = True, mirrored: b
 
 
 def damped(wi: Triple, wo: Triple, smooth: bool = False) -> Array:
-    """cos θ_i cos θ_o, which keeps f_r times it small near grazing, bounded from below: if smooth, with √(cos² θ + 0.03²)
-    for each cosine; else with at least SMALLEST_COSINE.
+    """cos θ_i cos θ_o, bounded from below: f_r times this stays small near grazing. Each cosine is taken for
+    √(cos² θ + 0.03²) if smooth, else for at least SMALLEST_COSINE.
 
     Errors of a blended value are divided by it: the former ends without a kink, and enlarges them less.
     """

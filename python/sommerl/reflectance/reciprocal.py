@@ -38,9 +38,11 @@ def reciprocal(brdf: Brdf) -> Brdf:
 class ReciprocalBrdf(Brdf):
     """The mean of both orders of the directions of another BRDF: see `reciprocal`."""
 
+    kind = "measurement"
+
     def __init__(self, brdf: Brdf) -> None:
         self._one_sided = brdf
-        self.name, self.source, self.kind = brdf.name, brdf.source, brdf.kind
+        self.name, self.source = brdf.name, brdf.source
         self._factors = np.ones(VIEWERS)
         self._factors = self._bounded()
         del self.sampler  # of what was not bounded yet

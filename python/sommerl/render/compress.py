@@ -8,6 +8,7 @@ from ..compression.compact import search
 from ..compression.compact.search import CompactOptions, CompactReport, Progress
 from ..compression.material import SomManBrdf
 from ..reflectance.brdf import Brdf
+from ..reflectance.reciprocal import reciprocal as averaged
 from .judge import Judge, score
 
 
@@ -16,6 +17,7 @@ def compress(
     *,
     target_size: int | None = None,
     target_psnr: float | None = None,
+    reciprocal: bool = False,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> tuple[SomManBrdf, CompactReport]:
@@ -23,8 +25,9 @@ def compress(
 
     target_size: the most bytes that its file may take; the material of that size with the best `judge.score` is
     returned. target_psnr: the least PSNR [dB] of a sphere in soft light (`judge`); the smallest material that reaches
-    it is returned. `search.DEFAULT_PSNR` if neither is given. seed: of directions, first weights and order; the same
-    input, options and seed give the same bytes. progress: called with steps done and steps in all.
+    it is returned. `search.DEFAULT_PSNR` if neither is given. reciprocal: compress the mean of both orders of the
+    directions (`reflectance.reciprocal`), which the targets then refer to. seed: of directions, first weights and
+    order; the same input, options and seed give the same bytes. progress: called with steps done and steps in all.
 
     The report's metrics say how far the material is from `brdf`, as it is given. It takes half a minute to a minute.
     Nothing is rendered.
@@ -33,11 +36,13 @@ def compress(
     MissingDependencyError without SciPy.
     """
     options = CompactOptions(target_size, target_psnr, seed)
-    judge = Judge(brdf)
+    fitted = averaged(brdf) if reciprocal else brdf
+    judge = Judge(fitted)
 
     def quality(material: SomManBrdf) -> float:
         metrics = judge.metrics(material)
         return score(metrics) if options.target_size is not None else metrics["psnr_soft_db"]
 
-    material, report = search.compress(brdf, options, quality=quality, progress=progress)
-    return material, replace(report, metrics=judge.metrics(material))
+    material, report = search.compress(fitted, options, quality=quality, progress=progress)
+    against = judge if fitted is brdf else Judge(brdf)
+    return material, replace(report, metrics=against.metrics(material))

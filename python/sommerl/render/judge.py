@@ -7,9 +7,9 @@ errors of log(f_r + 0.001) at random pairs of directions, everywhere and where l
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ PAIRS, GRAZING_PAIRS = 30_000, 10_000
 GRAZING = np.radians((80.0, 88.5))
 ANGLES = np.radians((0.0, 30.0, 60.0, 75.0, 80.0, 85.0, 88.0, 89.5))  # of viewers, whose albedo is compared
 POINTS = 4  # along each side of a sampler's cell, of the albedos' quadrature
+GOLDEN = np.pi * (3 - 5**0.5)  # the golden angle
 DARK = 1e-3  # an albedo below counts as that much in a ratio
 MOST = 99.0  # dB, in a mean with others, of pictures that are identical
 
@@ -66,11 +67,11 @@ class Judge:
 
 
 def score(metrics: dict[str, float]) -> float:
-    """One figure of quality for the choice between candidates [dB]: the mean of both PSNRs and of both log errors in
-    decibels, so that none of the four is bought with another one."""
-    logs = (-20 * np.log10(metrics[key] + 1e-9) for key in ("log_error", "log_error_grazing"))
-    pictures = (min(metrics[key], MOST) for key in ("psnr_soft_db", "psnr_lamp_db"))
-    return float(np.mean([*pictures, *logs]))
+    """One figure of quality for the choice between candidates [dB]: the mean of both PSNRs and of the log errors in
+    decibels, so that none of the three is bought with another one."""
+    errors = [metrics[key] + 1e-9 for key in ("log_error", "log_error_grazing")]
+    pictures = [min(metrics[key], MOST) for key in ("psnr_soft_db", "psnr_lamp_db")]
+    return float(np.mean([*pictures, -10 * np.log10(errors[0] * errors[1])]))
 
 
 def seen(brdf: Brdf) -> Seen:
@@ -106,13 +107,13 @@ def _sphere() -> tuple[NDArray[np.float64], Vectors]:
     normal = np.stack([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 0.0))], axis=-1)[inside]
     tangent = np.cross([0.0, 1.0, 0.0], normal)
     tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
-    frame = np.stack([tangent, np.cross(normal, tangent), normal], axis=1)
+    frame: Values = np.stack([tangent, np.cross(normal, tangent), normal], axis=1).astype(np.float64)
     return frame, frame[:, :, 2]
 
 
 def _lamps() -> tuple[Vectors, Values]:
     """Lamps for the sky and for each light of the built-in environment: directions and radiance times solid angle."""
-    z, phi = 1 - (np.arange(SKY) + 0.5) / SKY * 2, _turns(SKY)
+    z, phi = 1.0 - (np.arange(SKY) + 0.5) / SKY * 2, _turns(SKY)
     sky = np.stack([np.sqrt(1 - z * z) * np.cos(phi), z, np.sqrt(1 - z * z) * np.sin(phi)], axis=-1)
     up = np.clip(z, 0, 1)[:, None]
     radiance = np.where(z[:, None] > 0, np.array(HORIZON) + (np.array(ZENITH) - HORIZON) * up, 0.0)
@@ -139,12 +140,12 @@ def _towards(elevation: float, azimuth: float) -> NDArray[np.float64]:
     z = np.array([-np.sin(around) * np.cos(up), np.sin(up), np.cos(around) * np.cos(up)])
     x = np.cross([0.0, 1.0, 0.0], z)
     x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(z, x), z])
+    return np.stack([x, np.cross(z, x), z]).astype(np.float64)
 
 
 def _turns(count: int) -> Values:
     """Azimuths of points on a spiral, a golden angle from one to the next."""
-    return np.arange(count) * (np.pi * (3 - 5**0.5))
+    return np.arange(count, dtype=np.float64) * GOLDEN
 
 
 def _cosine(count: int, seed: int) -> Vectors:
@@ -160,8 +161,9 @@ def _grazing(count: int, seed: int) -> Vectors:
 
 def _psnr(reference: Values, candidate: Values) -> float:
     """PSNR of 8-bit sRGB pixels at the reference's exposure."""
-    scale = exposure(reference, np.ones(len(reference), bool))
-    return psnr(to_srgb8(reference * scale), to_srgb8(candidate * scale))
+    a, b = (pixels.astype(np.float32) for pixels in (reference, candidate))
+    scale = exposure(a, np.ones(len(a), bool))
+    return psnr(to_srgb8(a * scale), to_srgb8(b * scale))
 
 
 def _log_error(reference: Values, candidate: Values) -> float:
@@ -176,9 +178,13 @@ def _albedo_ratio(reference: Values, candidate: Values) -> float:
     return float((b / a).max())
 
 
-def _of(part: str, distance: Any) -> Any:
+def _of(part: str, distance: Callable[[Values, Values], float]) -> Callable[[Seen, Seen], float]:
     """A distance between the same part of what was seen of two BRDFs."""
-    return lambda reference, candidate: distance(getattr(reference, part), getattr(candidate, part))
+
+    def between(reference: Seen, candidate: Seen) -> float:
+        return distance(getattr(reference, part), getattr(candidate, part))
+
+    return between
 
 
 # What a `Judge` measures. A value takes what was `Seen` of reference and candidate.

@@ -37,8 +37,8 @@ class EnergyBound:
 
 
 def at_nodes(factors: Floats, lattice: NodeLattice) -> Floats:
-    """The factors for a lattice's nodes, (nodes): that of the viewer's angle, and on a reciprocal lattice of the light's
-    if that is smaller. factors: as from `EnergyBound`.
+    """The factors for a lattice's nodes, (nodes): that of the viewer's angle, and on a reciprocal lattice that of the
+    light's if it is smaller. factors: as from `EnergyBound`.
     """
     wi, wo = _node_directions(lattice)
     seen = _at(factors, wo)
@@ -46,7 +46,9 @@ def at_nodes(factors: Floats, lattice: NodeLattice) -> Floats:
 
 
 def _at(factors: Floats, w: Triple) -> Floats:
-    return np.interp(np.arctan2(np.hypot(w[0], w[1]), w[2]), ANGLES, factors)
+    theta: Floats = np.arctan2(np.hypot(w[0], w[1]), w[2])
+    found: Floats = np.interp(theta, ANGLES, factors)
+    return found
 
 
 def _node_directions(lattice: NodeLattice) -> tuple[Triple, Triple]:

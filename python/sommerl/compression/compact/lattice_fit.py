@@ -59,7 +59,7 @@ UNKNOWN = 1e30  # stands for the error of numbers of nodes that were not examine
 # The least squares
 DIRECTIONS = 1_000_000  # ten for each node of the largest lattice
 # Powers of the solid angle and of the cosines in the weights (docs/method.md)
-SOLID_POWER, COSINE_POWER = 0.7, 0.1
+SOLID_POWER, COSINE_POWER = 0.75, 0.25
 SYMMETRIC = 1e-3  # a source that differs by less (`distance.sidedness`) is mirrored; RGL's files differ by 10⁻⁵ at most
 LOWEST_COSINE = 1e-4  # closer to the horizon, no directions are drawn: f_r may have no bound there
 RIDGE = 0.05  # of the median of the matrix's diagonal; 0.5 costs 0.5 and 1.3 dB, 0.005 gains 0.5 and 0.7 dB
@@ -119,9 +119,7 @@ class Fitter:
         Raises MaterialError if `nodes` is not from SMALLEST to LARGEST.
         """
         problem = self.problem(nodes)
-        return FittedTable(
-            problem.lattice, problem.best, self.scale, signed=self._brdf.signed, name=self._brdf.name
-        )
+        return FittedTable(problem.lattice, problem.best, self.scale, signed=self._brdf.signed, name=self._brdf.name)
 
     def problem(self, nodes: int) -> Problem:
         """The least-squares problem on such a lattice, with its solution. Raises MaterialError as `fit` does."""
@@ -323,8 +321,8 @@ def _variation(grid: _Grid) -> float:
 
 
 def _weight(x: Array, y: Array, z: Array, wi: Triple, wo: Triple) -> Array:
-    """What an error counts at a place on the fine grid: the solid angles dω_i dω_o of one step, up to a constant factor,
-    and cos θ_i cos θ_o, each to its power."""
+    """What an error counts at a place on the fine grid: the solid angles dω_i dω_o of one step, up to a constant
+    factor, and the cosines (`damped`), each to its power."""
     theta_h, theta_d, _ = angles_at(x, y, z)
     steps = np.where(x < KNEE, 1 / BELOW, 1 / ABOVE)
     solid = np.sqrt(theta_h) * np.sin(theta_h) * np.sin(theta_d) * np.cos(theta_d) * steps
@@ -332,8 +330,8 @@ def _weight(x: Array, y: Array, z: Array, wi: Triple, wo: Triple) -> Array:
 
 
 def folds_of(brdf: Brdf) -> dict[str, bool]:
-    """How a lattice may fold φ_d for a source, as `NodeLattice` takes it: whether both orders of the directions give the
-    same, and whether light from both sides of the viewer's plane does, by construction or as far as can be seen."""
+    """How a lattice may fold φ_d for a source, as `NodeLattice` takes it: whether both orders of the directions give
+    the same; and whether light from both sides of the viewer's plane does, by construction or as far as can be seen."""
     buffers = brdf.buffers()
     mirrored = brdf.mirrored or sidedness(lambda wi, wo: brdf.f_r(wi, wo, buffers)) < SYMMETRIC
     return {"reciprocal": brdf.reciprocal, "mirrored": mirrored}

@@ -142,8 +142,8 @@ def quantise(
 def _first(problem: Problem, gains: int, shapes: int, seed: int, start: Start) -> Quantised:
     """Palettes learnt from the best values of the nodes, and for each node the nearest entries."""
     values = problem.best
-    gain = values.mean(axis=1)
-    least = np.abs(values).max(axis=1) / STEEPEST + DARKEST
+    gain: Floats = values.mean(axis=1)
+    least: Floats = np.abs(values).max(axis=1) / STEEPEST + DARKEST
     gain = np.where(np.abs(gain) < least, np.where(gain < 0, -least, least), gain)
     octaves, places = gain_codes(gain).astype(np.float64)[:, None], coordinates(values / gain[:, None])
     weight = np.sqrt(problem.system.diagonal() * gain**2)

@@ -202,15 +202,17 @@ class Compressor:
         As long as it does, the values at the nodes that are seen from there are made darker, and quantised again. What
         is then still too bright is made darker as a whole.
         """
-        factors = np.ones(1)
-        for _ in range(1 + DARKENINGS):
-            found, stream = quantise(problem, gains, shapes, room, seed=self._seed)
-            material = self._material(problem, found, self._fitter.scale)
-            factors = self._bound.factors(material)
+        found, stream = quantise(problem, gains, shapes, room, seed=self._seed)
+        material = self._material(problem, found, self._fitter.scale)
+        factors = self._bound.factors(material)
+        for _ in range(DARKENINGS):
             if factors.min() == 1.0:
                 return material, stream
             # Squared, since neighbours that are not as bright keep up what is seen between them.
             problem = problem.scaled(np.cbrt(at_nodes(factors**2, problem.lattice)))
+            found, stream = quantise(problem, gains, shapes, room, seed=self._seed)
+            material = self._material(problem, found, self._fitter.scale)
+            factors = self._bound.factors(material)
         return self._material(problem, found, self._fitter.scale * float(factors.min())), stream
 
     def _material(self, problem: Problem, found: Quantised, scale: float) -> SomManBrdf:
