@@ -1,11 +1,11 @@
 """What the option `distinct` changes: how many cells a unit remembers, the table's error, and PSNR on the sphere.
 
-    uv run python benchmarks/distinct.py ../shared/data/nbrdf/merl.npz
+    uv run python benchmarks/distinct.py FOLDER
 
-The argument is a folder of tables, or an archive, with the paper's six materials. Each is compressed by both rules at
-the settings of docs/method.md, without and with `distinct`; the reference is the table with nearest lookup. Prints
-Markdown: the share of units that store one colour three times, the relative L2 error and the cosine-weighted error of
-the logarithm over the table's cells, and the PSNR over the object [dB].
+FOLDER holds MERL tables of the paper's six materials; or it is an archive of neural BRDFs with them. Each is compressed
+by both rules at the settings of docs/method.md, without and with `distinct`; the reference is the table with nearest
+lookup. Prints Markdown: the share of units that store one colour three times, the relative L2 error and the
+cosine-weighted error of the logarithm over the table's cells, and the PSNR over the object [dB].
 """
 
 from __future__ import annotations
