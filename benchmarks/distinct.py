@@ -72,10 +72,10 @@ def main() -> None:
                 found.append(train(table, options, kernels=watched)[0])
                 error = table_metrics(table.values, found[-1].values, table.lattice)
                 share = of_one_colour(table, watched.learner.stored_cells())
-                figures.append((share, error.relative_error, error.log_error_cosine))
+                figures.append((share, error["relative_error"], error["log_error_cosine"]))
             compared = compare_on_sphere(table, found, default_environment(), spp=given.spp)
             shares, relative, logs = zip(*figures, strict=True)
-            psnr = [each.metrics.psnr_object_db for each in compared]
+            psnr = [each.metrics["psnr_object_db"] for each in compared]
             print(
                 f"| {name}, {clusters}, {epochs} | {rule}, {alpha} | {shares[0]:.0%}, {shares[1]:.0%} | "
                 f"{relative[0]:.5f}, {relative[1]:.5f} | {logs[0]:.5f}, {logs[1]:.5f} | "
