@@ -56,7 +56,7 @@ def described(data: Path | None) -> str:
     """What the materials in `data` are, as captions say it."""
     if data is None:
         return "built-in SGD stand-ins"
-    return f"NBRDF stand-ins of {data.name}" if data.is_file() else f"the files in {data.resolve().name}"
+    return f"NBRDF stand-ins of {data.name}" if data.is_file() else f"the files in {data.absolute().name}"
 
 
 def compressed(table: BrdfTable, clusters: int, epochs: int = 30, **rule: Unpack[Learnt]) -> SomManBrdf:
