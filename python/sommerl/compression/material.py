@@ -69,6 +69,10 @@ class SomManBrdf(OnLattice):
         return Counts(*(facts.get(each.name) for each in fields(Counts)))
 
     @property
+    def signed(self) -> bool:
+        return self.palette.signed
+
+    @property
     def domain(self) -> str:
         """In which values are stored and blended: "linear" or "cube-root"."""
         return self.palette.domain

@@ -31,6 +31,7 @@ class Palette(ABC):
 
     domain: ClassVar[Literal["linear", "cube-root"]]  #: in which entries are blended
     lut: NDArray[np.float64]
+    signed: bool = False  #: whether reflectances may be negative
 
     @property
     @abstractmethod

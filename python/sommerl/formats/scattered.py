@@ -87,7 +87,7 @@ def to_table(samples: Samples, *, name: str, source_sha256: str | None = None, l
     values = np.zeros((*coarse.shape, 3))
     values[above] = _regression(both, wi, wo)
     try:
-        fitted = BrdfTable(np.maximum(values, 0.0), coarse, name=name)
+        fitted = BrdfTable(representable(values)[0], coarse, name=name)
     except MaterialError as error:
         raise FormatError("expected a positive reflectance in some sample, found none") from error
     fine = BrdfTable.sampled(fitted, lattice)

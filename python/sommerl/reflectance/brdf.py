@@ -206,6 +206,10 @@ class OnLattice(Brdf):
         return self.lattice.reciprocal
 
     @property
+    def mirrored(self) -> bool:
+        return self.lattice.mirrored
+
+    @property
     def lookup(self) -> str:
         return self.interpolation
 

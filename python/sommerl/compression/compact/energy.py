@@ -16,9 +16,9 @@ from ...reflectance.nodes import NodeLattice, angles_at
 
 # Of viewers, closer together where albedos change fastest
 ANGLES = np.radians((0, 10, 20, 30, 40, 50, 60, 68, 74, 78, 81, 84, 86, 87, 88, 88.5, 89, 89.3, 89.5))
-POINTS = 8  # along each side of a sampler's cell, of the albedos' quadrature
+POINTS = 16  # along each side of a sampler's cell, of the albedos' quadrature
 ALLOWED = 1.02  # times the source's albedo, or 1 if that is more
-AIM = 0.99  # of what is allowed, since quadrature and interpolation between ANGLES are not exact
+AIM = 0.985  # of what is allowed, since quadrature and interpolation between ANGLES are not exact
 
 Floats = NDArray[np.float64]
 
