@@ -284,18 +284,27 @@ def zipped(rng: random.Random, whole: bytes, mutate: Mutate) -> bytes:
     return out.getvalue()
 
 
-def smrl_seeds(nodes: bool) -> list[bytes]:
-    rng = np.random.default_rng(0)
-    known: dict[str, Any] = {"name": "seed", "options": {"seed": 1, "source_facts": {"samples": 3}}}
-    if nodes:
-        lattice = NodeLattice((0, 60, 180), (0, 0, 1), ((0, 90, 180), (0, 180)), ((0, 90), (0,)))
-        gain, shape = (rng.integers(0, 3, lattice.size).astype(np.uint16) for _ in range(2))
-        lut, gains = shape_values(np.array([[-3, 0], [0, 1], [5, 7]])), gain_values(np.array([3, 200, 900]))
-        made = sommerl.SomManBrdf(GainsAndShapes(gains, lut, 0.04), np.stack([gain, shape]), lattice, **known)
-    else:
-        cells = Lattice(3, 4, 5)
-        made = sommerl.SomManBrdf(rng.random((4, 3)), rng.integers(0, 4, cells.shape).astype(np.uint8), cells, **known)
+KNOWN: dict[str, Any] = {"name": "seed", "options": {"seed": 1, "source_facts": {"samples": 3}}}
+FIRST_NODES = Path(__file__).parents[1] / "tests" / "golden" / "nodes.smrl"  # of version 1: nobody writes it any more
+
+
+def cells_seeds() -> list[bytes]:
+    rng, cells = np.random.default_rng(0), Lattice(3, 4, 5)
+    made = sommerl.SomManBrdf(rng.random((4, 3)), rng.integers(0, 4, cells.shape).astype(np.uint8), cells, **KNOWN)
     return [smrl.encode(made)]
+
+
+def nodes_seeds() -> list[bytes]:
+    rng, files = np.random.default_rng(0), [FIRST_NODES.read_bytes()]
+    lut, gains = shape_values(np.array([[-3, 0], [0, 1], [5, 7]])), gain_values(np.array([-200, 3, 900]))
+    for reciprocal in (False, True):
+        for mirrored in (False, True):
+            phi_d = ((0, 90, 180) if mirrored else (0, 90), (0,))
+            lattice = NodeLattice((0, 60, 180), (0, 0, 1), ((0, 90, 180), (0, 180)), phi_d, reciprocal, mirrored)
+            gain, shape = (rng.integers(0, 3, lattice.size).astype(np.uint16) for _ in range(2))
+            entries = GainsAndShapes(gains, lut, 0.04, signed=reciprocal != mirrored)
+            files.append(smrl.encode(sommerl.SomManBrdf(entries, np.stack([gain, shape]), lattice, **KNOWN)))
+    return files
 
 
 def stream_of_cells(whole: bytes) -> int:
@@ -507,9 +516,9 @@ def resumable(state: checkpoint.State) -> None:
 
 
 READERS = [
-    Reader("smrl-nodes", ".smrl", lambda: smrl_seeds(True), sommerl.load, smrl.LONGEST_FILE, evaluated, sealed),
+    Reader("smrl-nodes", ".smrl", nodes_seeds, sommerl.load, smrl.LONGEST_FILE, evaluated, sealed),
     Reader(
-        "smrl-cells", ".smrl", lambda: smrl_seeds(False), sommerl.load, smrl.LONGEST_FILE, evaluated,
+        "smrl-cells", ".smrl", cells_seeds, sommerl.load, smrl.LONGEST_FILE, evaluated,
         inflated(stream_of_cells),
     ),
     Reader(

@@ -2,14 +2,17 @@
 
 import struct
 import zlib
+from itertools import pairwise
 
 import numpy as np
 
 from sommerl import SomManBrdf
 from sommerl.compression.palette import GainsAndShapes
-from sommerl.compression.smrl.codes import gain_values, shape_values
-from sommerl.compression.smrl.file import MAGIC, VERSION, decode
+from sommerl.compression.smrl.codes import coordinates, gain_codes, gain_values, shape_codes, shape_values
+from sommerl.compression.smrl.file import MAGIC, VERSIONS, decode, encode
+from sommerl.compression.smrl.reference_model import Model
 from sommerl.reflectance.nodes import FINE, NodeLattice
+from sommerl.reflectance.origin import Source
 from sommerl.system.sealed_file import PREFIX
 
 # Bands, inner nodes of an axis at most, gains, shapes, and how the entries come.
@@ -23,27 +26,47 @@ CASES = {
     "big-palettes": (2, 6, 1024, 1024, "random"),
     "late": (2, 12, 64, 64, "late"),  # nothing new for long, and then much
 }
+# Which folds of φ_d a lattice has.
+FOLDS = {
+    "reciprocal": {"reciprocal": True, "mirrored": False},
+    "mirrored": {"reciprocal": False, "mirrored": True},
+    "both": {"reciprocal": True, "mirrored": True},
+    "neither": {"reciprocal": False, "mirrored": False},
+}
 
 
-def material(case="smooth", seed=0):
+def material(case="smooth", seed=0, *, folds=FOLDS["reciprocal"], signed=False):
+    """A material that is made up. signed: its gains have both signs, too."""
     bands, inner, gains, shapes, manner = CASES[case] if isinstance(case, str) else case
     rng = np.random.default_rng(seed)
-    lattice = random_lattice(rng, bands, inner)
-    gain_codes = np.sort(rng.choice(4096, gains, replace=False))
+    lattice = random_lattice(rng, bands, inner, folds)
+    gain_codes = np.sort(rng.choice(8191, gains, replace=False) - 4095 if signed else rng.choice(4096, gains, False))
     shape_codes = rng.integers(-1024, 1025, (shapes, 2)) if manner == "random" else rng.integers(-90, 91, (shapes, 2))
     if manner == "grey":
         shape_codes[:] = 0
     shape_codes = shape_codes[np.lexsort(shape_codes.T[::-1])]
     gain, shape = (_entries(rng, n, lattice.size, manner) for n in (gains, shapes))
-    palette = GainsAndShapes(gain_values(gain_codes), shape_values(shape_codes), 0.1 + rng.random())
+    palette = GainsAndShapes(gain_values(gain_codes), shape_values(shape_codes), 0.1 + rng.random(), signed)
     return SomManBrdf(palette, np.stack([gain, shape]), lattice, name="made up")
 
 
-def random_lattice(rng, bands, inner):
+def golden(name):
+    """What was written to tests/golden/nodes-2-NAME.smrl: small, but of several bands."""
+    made = material(
+        (3, 5, 24, 20, "walk"), 19 + list(FOLDS).index(name), folds=FOLDS[name], signed=name != "reciprocal"
+    )
+    made.name, made.source = f"golden nodes, {name}", Source("0123456789abcdef" * 4)
+    made.options, made.metrics = {"seed": 3}, {"rmse": 0.25}
+    return made
+
+
+def random_lattice(rng, bands, inner, folds=FOLDS["reciprocal"]):
     theta_h = (*_axis(rng, max(inner, bands - 2), bands - 2), FINE)
     band = sorted([*range(bands), *rng.integers(0, bands, len(theta_h) - bands).tolist()])
     theta_d, phi_d = ([_axis(rng, inner) for _ in range(bands)] for _ in range(2))
-    return NodeLattice(theta_h, tuple(band), tuple((*axis, FINE) for axis in theta_d), tuple(phi_d))
+    if folds["mirrored"]:
+        phi_d = [(0,) if rng.random() < 0.2 else (*axis, FINE) for axis in phi_d]
+    return NodeLattice(theta_h, tuple(band), tuple((*axis, FINE) for axis in theta_d), tuple(phi_d), **folds)
 
 
 def _axis(rng, most, least=0):
@@ -60,8 +83,9 @@ def _entries(rng, entries, nodes, manner):
     return found
 
 
-def sealed(body, version=VERSION):
-    """A file with a checksum that fits."""
+def sealed(body, version=None):
+    """A file with a checksum that fits; of the version in which its kind is written if None."""
+    version = VERSIONS.get(body[0] if body else 0, 1) if version is None else version
     return PREFIX.pack(MAGIC, version, zlib.crc32(body)) + body
 
 
@@ -77,7 +101,8 @@ def broken(body):
 
 def same_numbers(one, other):
     """Whether two materials look up the same, bit for bit."""
-    same = (one.lattice, one.interpolation, scale(one)) == (other.lattice, other.interpolation, scale(other))
+    same = one.lattice == other.lattice and one.interpolation == other.interpolation
+    same = same and (scale(one), signed(one)) == (scale(other), signed(other))
     return same and all(a.tobytes() == b.tobytes() for a, b in zip(arrays(one), arrays(other), strict=True))
 
 
@@ -94,13 +119,18 @@ def scale(material):
     return 1.0 if material.grid else material.palette.scale
 
 
+def signed(material):
+    """Whether blended values keep their sign."""
+    return not material.grid and material.palette.signed
+
+
 def stream(file):
     """The stream of nodes in a file, and what comes before it."""
     assert not decode(file).grid
     name = file[11]
     digest = file[12 + name]
     (notes,) = struct.unpack_from("<H", file, 13 + name + digest)
-    at = 15 + name + digest + notes + 4
+    at = 15 + name + digest + notes + 4 + (file[4] > 1)
     return file[at:], file[PREFIX.size : at]
 
 
@@ -170,6 +200,47 @@ def _head(bands, theta_h, rows, axes, gains, shapes, palette):
     return writer
 
 
+def whole(made, version=2):
+    """The stream of a material, by this writer and the model in plain Python."""
+    theta_h, band, theta_d, phi_d = axes = made.lattice.axes()
+    mirrored = made.lattice.mirrored
+    gains, shapes = gain_codes(made.palette.gains).tolist(), shape_codes(coordinates(made.lut)).tolist()
+    turns = [_inner(axis[:-1] if mirrored and len(axis) > 1 else axis, len(axis) - 1) for axis in phi_d]
+    closed = [_inner(axis[:-1], len(axis) - 2) for axis in (theta_h, *theta_d)]
+    rows = [band.count(b) for b in range(len(theta_d) - 1)]
+    steps = [each for pair in zip(closed[1:], turns, strict=True) for each in pair]
+    codes = [(_folded(gains[0]) if version > 1 else gains[0], 0), *((b - a - 1, 0) for a, b in pairwise(gains))]
+    for before, after in pairwise([(-1024, 0), *shapes]):
+        codes += [(after[0] - before[0], 1), (_folded(after[1] - before[1]), 2)]
+    writer = _head(len(theta_d), closed[0], rows, steps, len(gains), len(shapes), codes)
+    model, entries = Model(axes, mirrored, gains, shapes), zip(*made.index.tolist(), strict=True)
+    for row, b in enumerate(band):
+        model.begin(row)
+        for d in range(len(theta_d[b])):
+            for p in range(len(phi_d[b])):
+                model.expect(d, p)
+                gain, shape = next(entries)
+                writer.pick(gain, model.gain_weights())
+                writer.pick(shape, model.shape_weights())
+                model.learn(d, p, gain, shape)
+    return writer.finish()
+
+
+def _inner(places, count):
+    return [count, *(b - a - 1 for a, b in pairwise(places))]
+
+
+def _folded(number):
+    """0, −1, 1, −2, … as 0, 1, 2, 3, …"""
+    return 2 * number if number >= 0 else -2 * number - 1
+
+
+def in_version_1(made):
+    """The file of format 1 of a material, which nobody writes any more."""
+    _, head = stream(encode(made))
+    return sealed(head[:-1] + whole(made, 1), 1)
+
+
 FULL = [64, *[0] * 64]
 GOOD = [(4095, 0), (0, 1), (0, 2)]
 
@@ -195,9 +266,24 @@ HOSTILE_STREAMS = {
     "nodes": {"theta_h": [62, *[0] * 62], "axes": (FULL, FULL)},
     "gains": {"gains": 1025},
     "shapes": {"shapes": 1025},
-    "gain": {"palette": [(4096, 0)]},
-    "gain-2": {"gains": 2, "palette": [(4095, 0), (0, 0)]},
     "shape": {"palette": [(4095, 0), (2049, 1)]},
     "shape-2": {"palette": [(4095, 0), (0, 1), (2049, 2)]},
     "shape-3": {"palette": [(4095, 0), (0, 1), (2050, 2)]},
 }
+# By version: the first one is a number in version 1, and has a sign in version 2.
+HOSTILE_GAINS = {
+    1: {"gain": {"palette": [(4096, 0)]}, "gain-2": {"gains": 2, "palette": [(4095, 0), (0, 0)]}},
+    2: {
+        "gain": {"palette": [(8192, 0)]},
+        "gain-2": {"gains": 2, "palette": [(8190, 0), (0, 0)]},
+        "gain-3": {"palette": [(8191, 0)]},
+        "gain-4": {"gains": 2, "palette": [(8189, 0), (8191, 0)]},
+    },
+}
+HOSTILE_FOLDED = {"axis-5": {"axes": ([0], [2, 179])}, "axis-6": {"axes": ([0], [182, *[0] * 181])}}
+
+
+def hostile_streams(version=2, mirrored=False):
+    """Streams that hold a number beyond its bounds, by its name in messages."""
+    numbers = HOSTILE_STREAMS | HOSTILE_GAINS[version] | (HOSTILE_FOLDED if mirrored else {})
+    return {name: written(**each) for name, each in numbers.items()}

@@ -9,18 +9,20 @@ import sys
 
 import numpy as np
 import pytest
-from compact import material, stream
+from compact import FOLDS, material, whole
 from helpers import must_fail
 
 from sommerl import _core
-from sommerl.compression.smrl.file import encode
 
 RNG = np.random.default_rng(0)
 F32 = RNG.random((40, 3)).astype(np.float32)
 UP = np.abs(RNG.standard_normal((70, 3)))
 MADE = material((2, 2, 3, 3, "walk"), 1)
-STREAM, _ = stream(encode(MADE))
-FIELDS = [[0, 30, 180], [0, 1, 1], [[0, 180], [0, 180]], [[0, 90], [0]], [1, 2], [[0, 1], [0, 1]]]
+FOLDED = material((2, 2, 3, 3, "walk"), 1, folds=FOLDS["mirrored"], signed=True)
+RECIPROCAL, MIRRORED = (
+    [*made.lattice.axes(), made.palette.gains, made.lut, *made.index, 1.0] for made in (MADE, FOLDED)
+)
+FIELDS = [[0, 30, 180], [0, 1, 1], [[0, 180], [0, 180]], [[0, 90], [0]], [-1, 2], [[0, 1], [0, 1]], False, False]
 NODES = 8
 BITS = [np.zeros(NODES, np.uint16), np.ones(NODES, np.uint16)]
 SWEEP = [
@@ -47,7 +49,7 @@ def in_cells(*arguments):
 
 
 def on_nodes(*arguments):
-    return _core.NodeLookup(*arguments[:9]).eval(*arguments[9:])
+    return _core.NodeLookup(*arguments[:12]).eval(*arguments[12:])
 
 
 # What is called, and arguments that fit.
@@ -61,14 +63,14 @@ CALLS = {
     "lookup-trilinear": (in_cells, [(2, 2, 2), False, True, RNG.random(24), None, UP, UP, "portable", 2]),
     "lookup-index": (in_cells, [(2, 2, 2), True, True, RNG.random(6), np.ones(8, np.uint8), UP, UP, None, 2]),
     "lookup-index-16": (in_cells, [(2, 2, 2), True, False, RNG.random(6), np.ones(8, np.uint16), UP, UP, None, 2]),
-    "lookup-nodes": (
-        on_nodes,
-        [*MADE.lattice.axes(), MADE.palette.gains, MADE.lut, *MADE.index, 1.0, UP, UP, "portable", 2],
-    ),
+    "lookup-nodes": (on_nodes, [*RECIPROCAL, True, False, False, UP, UP, "portable", 2]),
+    "lookup-mirrored": (on_nodes, [*MIRRORED, False, True, True, UP, UP, None, 2]),
     "nodes": (_core.NodePalette, FIELDS),
     "encode": (lambda *bits: _core.NodePalette(*FIELDS).encode(*bits), [*BITS, None]),
     "measure": (lambda *bits: _core.NodePalette(*FIELDS).measure(*bits), BITS),
-    "decode": (_core.NodePalette.decode, [STREAM, "portable"]),
+    "decode": (_core.NodePalette.decode, [whole(MADE), True, False, 2, "portable"]),
+    "decode-mirrored": (_core.NodePalette.decode, [whole(FOLDED), False, True, 2, None]),
+    "decode-1": (_core.NodePalette.decode, [whole(MADE, 1), True, False, 1, None]),
     "sweep": (swept, SWEEP),
 }
 HUGE = (0, 1, 2, 3, 255, 256, 65536, 2**31, 2**32 - 1, 2**32, 2**63 - 1, 2**63, 2**64 - 1, -1)

@@ -3,7 +3,7 @@ import pytest
 from helpers import must_fail, random_directions
 
 from sommerl.reflectance.arrays import split
-from sommerl.reflectance.half_diff import directions, half_diff
+from sommerl.reflectance.half_diff import directions, half_diff, phi_d_range
 
 
 def by_rotation(wi, wo):
@@ -68,6 +68,50 @@ def test_that_check_notices_unfolded_angles_and_folding_after_the_arctangent():
 
     must_fail(check_reciprocity, lambda wi, wo: half_diff(wi, wo, reciprocal=False))
     must_fail(check_reciprocity, folded_late)
+
+
+def check_mirror_symmetry(function):
+    wi, wo = random_directions(100_000, 3), random_directions(100_000, 4)
+    wi[:100, 1] = wo[:100, 1] = 0  # in the plane of the mirror
+    wi[100:200] = wo[100:200] * [-1, -1, 1]
+    mirror = [1, -1, 1]
+    for one, other in zip(
+        function(split(wi), split(wo)), function(split(wi * mirror), split(wo * mirror)), strict=True
+    ):
+        assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize("reciprocal", [False, True])
+def test_mirror_images_give_the_same_bits(reciprocal):
+    check_mirror_symmetry(lambda wi, wo: half_diff(wi, wo, reciprocal, mirrored=True))
+    must_fail(check_mirror_symmetry, lambda wi, wo: half_diff(wi, wo, reciprocal))
+
+
+def test_both_orders_give_the_same_bits_of_what_is_mirrored():
+    check_reciprocity(lambda wi, wo: half_diff(wi, wo, mirrored=True))
+    must_fail(check_reciprocity, lambda wi, wo: half_diff(wi, wo, reciprocal=False, mirrored=True))
+
+
+def check_folds(function):
+    """Each fold takes φ_d to where the angle without folds goes."""
+    wi, wo = split(random_directions(10_000, 9)), split(random_directions(10_000, 10))
+    whole = half_diff(wi, wo, False)[2]
+    turned, back = whole % np.pi, np.minimum(whole, 2 * np.pi - whole)
+    for folds, wanted in (
+        ((True, False), turned),
+        ((False, True), back),
+        ((True, True), np.minimum(turned, np.pi - turned)),
+    ):
+        found = function(wi, wo, *folds)[2]
+        assert np.allclose(found, wanted, atol=1e-9)
+        assert 0 <= found.min() <= 1e-2
+        assert phi_d_range(*folds) - 1e-2 <= found.max() <= phi_d_range(*folds)
+
+
+def test_folds():
+    check_folds(half_diff)
+    must_fail(check_folds, lambda wi, wo, reciprocal, mirrored: half_diff(wi, wo, reciprocal))
+    must_fail(check_folds, lambda wi, wo, reciprocal, mirrored: half_diff(wi, wo, mirrored, reciprocal))
 
 
 def test_swapping_adds_pi_when_not_folded():

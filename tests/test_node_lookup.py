@@ -1,14 +1,18 @@
-"""Evaluation on a lattice of nodes in the core against `FittedTable`, the same in NumPy."""
+"""Evaluation on a lattice of nodes in the core against `SomManBrdf.f_r`, the same in NumPy."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from compact import FOLDS
 from helpers import must_fail, random_directions
 
-from sommerl import Brdf, BrdfTable, Lattice, _core
-from sommerl.compression.compact.fitted_table import FittedTable
+from sommerl import Brdf, BrdfTable, Lattice, SomManBrdf, _core
+from sommerl.compression.palette import GainsAndShapes
 from sommerl.reflectance.nodes import FINE, NodeLattice
+from sommerl.render.bsdf import upload
+from sommerl.render.llvm import mitsuba
 
 WIDE = tuple(range(0, FINE + 1, 4))
 SIX = [sorted({0, 180, *range(b + 1, 180, 7 * b + 9)}) for b in range(6)]
@@ -22,14 +26,32 @@ LATTICES = {
     "wide": NodeLattice(WIDE, (0,) * 20 + (1,) * 26, (WIDE, (*WIDE[::2], 180)), (WIDE[:-1], (0, 1, 2, 179))),
     "finest": NodeLattice((0, 180), (0, 1), (tuple(range(181)),) * 2, (tuple(range(180)), (0,))),
 }  # fmt: skip
-SCALE = 0.3
+
+
+def folded(lattice, folds):
+    """The same lattice with other folds."""
+    phi_d = lattice.phi_d
+    if folds["mirrored"]:
+        phi_d = tuple(axis if len(axis) == 1 else (*axis[1:-1], FINE) for axis in phi_d)
+        phi_d = tuple(axis if axis[0] == 0 else (0, *axis) for axis in phi_d)
+    return replace(lattice, phi_d=phi_d, **folds)
+
+
+FOLDED = {  # and whether blended values keep their sign
+    f"{name}, {fold}{', signed' if signed else ''}": (folded(LATTICES[name], folds), signed)
+    for name in ("one band", "six bands", "wide", "finest")
+    for fold, folds in FOLDS.items()
+    for signed in (False, True)
+}
+# As a file holds it.
+SCALE = float(np.float32(0.3))
 PAIRS = random_directions(100_003, 1), random_directions(100_003, 2)
 FEW = PAIRS[0][:17], PAIRS[1][:17]  # for which the core does not multiply all gains with all shapes
 
 
 def factors(lattice):
     rng = np.random.default_rng(lattice.size)
-    gains, shapes = rng.random(200) * 2, rng.random((150, 3)) - 0.1
+    gains, shapes = rng.random(200) * 2 - 0.2, rng.random((150, 3)) - 0.1
     index = (rng.integers(0, count, lattice.size).astype(np.uint16) for count in (200, 150))
     return gains, shapes, *index
 
@@ -39,13 +61,17 @@ def arguments(lattice):
     return list(lattice.theta_h), list(lattice.band), *nested, *factors(lattice), SCALE
 
 
-def in_numpy(lattice):
+def in_numpy(lattice, signed=False):
     gains, shapes, gain, shape = factors(lattice)
-    return FittedTable(lattice, gains[gain][:, None] * shapes[shape], SCALE, name="made up")
+    return SomManBrdf(GainsAndShapes(gains, shapes, SCALE, signed), np.stack([gain, shape]), lattice, name="made up")
+
+
+def lookup(lattice, signed=False):
+    return _core.NodeLookup(*arguments(lattice), **lattice.folds, signed=signed)
 
 
 def found(name, wi, wo, simd=None, threads=None):
-    return _core.NodeLookup(*arguments(LATTICES[name])).eval(wi, wo, simd, threads)
+    return lookup(LATTICES[name]).eval(wi, wo, simd, threads)
 
 
 EXPECTED = {name: Brdf.eval(in_numpy(lattice), *PAIRS) for name, lattice in LATTICES.items()}
@@ -61,6 +87,76 @@ def check_agrees(values, expected):
 def test_the_core_agrees_with_numpy(name, threads, simd):
     check_agrees(found(name, *PAIRS, simd, threads), EXPECTED[name])
     check_agrees(found(name, *FEW, simd, threads), EXPECTED[name][:17])
+
+
+@pytest.mark.parametrize("simd", _core.simd_paths())
+@pytest.mark.parametrize("name", FOLDED)
+def test_the_core_agrees_with_numpy_with_all_folds(name, simd):
+    lattice, signed = FOLDED[name]
+    wi, wo = PAIRS[0][:20_000], PAIRS[1][:20_000]
+    made = in_numpy(lattice, signed)
+    expected = Brdf.eval(made, wi, wo)
+    assert (expected < 0).any() == signed
+    values = lookup(lattice, signed).eval(wi, wo, simd)
+    check_agrees(values, expected)
+    check_agrees(lookup(lattice, signed).eval(*FEW, simd), expected[:17])
+    assert np.array_equal(made.eval(wi, wo), lookup(lattice, signed).eval(wi, wo))
+    must_fail(check_agrees, lookup(lattice, not signed).eval(wi, wo, simd), expected)
+    other = replace(lattice, reciprocal=not lattice.reciprocal)
+    must_fail(check_agrees, lookup(other, signed).eval(wi, wo, simd), expected)
+
+
+def check_same_of_mirror_images(evaluate):
+    mirror = [1, -1, 1]
+    check_same_bits(evaluate(*PAIRS), evaluate(PAIRS[0] * mirror, PAIRS[1] * mirror))
+
+
+@pytest.mark.parametrize("name", FOLDED)
+def test_folded_pairs_give_the_same_to_the_last_bit(name):
+    lattice, signed = FOLDED[name]
+    evaluate = lookup(lattice, signed).eval
+    for check, same in ((check_reciprocal, lattice.reciprocal), (check_same_of_mirror_images, lattice.mirrored)):
+        if same:
+            check(evaluate)
+        else:
+            must_fail(check, evaluate)
+
+
+def in_drjit(made):
+    """f_r by Dr.Jit, in single precision."""
+    mi, buffers = mitsuba(), {name: upload(buffer) for name, buffer in made.buffers().items()}
+
+    def evaluate(*pair):
+        wi, wo = (tuple(mi.Float(c.astype(np.float32)) for c in w.T) for w in pair)
+        return np.stack([np.array(c) for c in made.f_r(wi, wo, buffers)], axis=-1)
+
+    return evaluate
+
+
+def check_close(values, expected):
+    assert (np.abs(values - expected) <= 1e-3 * np.abs(expected) + 1e-4).all(axis=-1).mean() > 0.999
+
+
+@pytest.mark.parametrize("name", [name for name in FOLDED if name.startswith("six bands")])
+def test_drjit_agrees_with_all_folds(name):
+    lattice, signed = FOLDED[name]
+    evaluate, expected = in_drjit(in_numpy(lattice, signed)), lookup(lattice, signed).eval(*PAIRS)
+    values = evaluate(*PAIRS)
+    check_close(values, expected)
+    assert (values < 0).any() == signed
+    other = replace(lattice, reciprocal=not lattice.reciprocal)
+    must_fail(check_close, in_drjit(in_numpy(other, signed))(*PAIRS), expected)
+    for check, same in ((check_reciprocal, lattice.reciprocal), (check_same_of_mirror_images, lattice.mirrored)):
+        if same:
+            check(evaluate)
+        else:
+            must_fail(check, evaluate)
+
+
+@pytest.mark.parametrize("fold", ["mirrored", "both"])
+def test_one_node_in_phi_d_means_the_same_with_all_folds(fold):
+    minimal = LATTICES["minimal"]
+    check_agrees(lookup(replace(minimal, **FOLDS[fold])).eval(*PAIRS), lookup(minimal).eval(*PAIRS))
 
 
 def test_that_check_notices_another_node_another_shape_and_another_order():
@@ -107,9 +203,9 @@ def test_mirror_retro_grazing_and_polar_directions():
     wo[1000:2000, 2] *= 1e-9
     wo[2000:] = [0, 0, 1]
     wo /= np.linalg.norm(wo, axis=-1, keepdims=True)
-    for name, lattice in LATTICES.items():
+    for lattice, signed in (*((lattice, False) for lattice in LATTICES.values()), *FOLDED.values()):
         for wi in (wo, wo * [-1, -1, 1], np.roll(wo, 1, axis=0)):
-            check_agrees(found(name, wi, wo), Brdf.eval(in_numpy(lattice), wi, wo))
+            check_agrees(lookup(lattice, signed).eval(wi, wo), Brdf.eval(in_numpy(lattice, signed), wi, wo))
 
 
 def check_dark(values):
@@ -128,8 +224,9 @@ def test_zero_below_the_horizon():
 def test_what_is_no_direction_reads_nothing_outside(simd):
     odd = [[0, 0, 0], [np.nan] * 3, [np.inf, 0, 1], [0, 0, 1e300], [0, 0, 1e-300], [-0.0, 0.0, 1.0], [np.nan, 0, 1]]
     wi, wo = np.repeat(odd, len(odd), axis=0), np.tile(odd, (len(odd), 1))
-    for name, times in itertools.product(LATTICES, (1, 2000)):
-        values = found(name, np.tile(wi, (times, 1)), np.tile(wo, (times, 1)), simd)
+    made = (*((lattice, False) for lattice in LATTICES.values()), *FOLDED.values())
+    for (lattice, signed), times in itertools.product(made, (1, 2000)):
+        values = lookup(lattice, signed).eval(np.tile(wi, (times, 1)), np.tile(wo, (times, 1)), simd)
         assert values.shape == (times * len(wi), 3)
         known = np.isfinite(np.tile(wi + wo, (times, 1))).all(axis=-1)
         assert np.array_equal(np.isfinite(values).all(axis=-1), known)
@@ -212,7 +309,7 @@ def check_sees_changes(prepare):
     prepared = prepare(*axes, gains, shapes, gain, shape, scale)
     for changed in (gains, shapes, gain, shape):
         changed[:] = np.roll(changed, 1, axis=0)
-        made = FittedTable(lattice, gains[gain][:, None] * shapes[shape], SCALE, name="made up")
+        made = SomManBrdf(GainsAndShapes(gains, shapes, SCALE), np.stack([gain, shape]), lattice, name="made up")
         check_agrees(prepared.eval(*PAIRS), Brdf.eval(made, *PAIRS))
         check_agrees(prepared.eval(*FEW), Brdf.eval(made, *FEW))
 

@@ -82,25 +82,28 @@ class NodePalette:
         phi_d: list[list[int]],
         gains: list[int],
         shapes: list[list[int]],
+        reciprocal: bool = True,
+        mirrored: bool = False,
     ) -> None:
-        """theta_h, band, theta_d, phi_d: the fields of the `NodeLattice`; bands in order, at most 16, and 2¹⁷ nodes.
-        gains (G,) and shapes (S, 2): codes (`compression.smrl.codes`) in order, at most 1024 each. Raises ValueError
-        for others.
+        """theta_h, band, theta_d, phi_d, reciprocal, mirrored: the fields of the `NodeLattice`; bands in order, at most
+        16, and 2¹⁷ nodes. gains (G,) and shapes (S, 2): codes (`compression.smrl.codes`) in order, at most 1024 each.
+        Raises ValueError for others.
         """
 
     @staticmethod
     def decode(
-        data: bytes, simd: str | None = None
+        data: bytes, reciprocal: bool, mirrored: bool, version: int = 2, simd: str | None = None
     ) -> tuple[NodePalette, tuple[NDArray[np.uint16], NDArray[np.uint16]]]:
         """What a stream holds: lattice and palette; and the gain and the shape of each node, (nodes,) each.
 
-        simd changes nothing but the time. Raises ValueError for a stream that `encode` does not write, with the same
-        sentence as the other readers.
+        reciprocal, mirrored: of the lattice. version: of the stream, 1 or 2; in version 1, all are reciprocal and not
+        mirrored. simd changes nothing but the time. Raises ValueError for a stream that is not the only one of a
+        material, with the same sentence as the other readers.
         """
 
     def encode(self, gain: NDArray[np.uint16], shape: NDArray[np.uint16], simd: str | None = None) -> bytes:
-        """The stream of a gain and a shape for each node, (nodes,) each. Raises ValueError for what does not fit, and
-        for what would keep readers busy for too long.
+        """The stream, of version 2, of a gain and a shape for each node, (nodes,) each. Raises ValueError for what does
+        not fit, and for what would keep readers busy for too long.
         """
 
     def measure(self, gain: NDArray[np.uint16], shape: NDArray[np.uint16]) -> tuple[float, float]:
@@ -141,6 +144,14 @@ class NodePalette:
     @property
     def phi_d(self) -> list[list[int]]:
         """For each band."""
+
+    @property
+    def reciprocal(self) -> bool:
+        """Whether both orders of the directions give the same."""
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether φ_d and −φ_d give the same."""
 
     @property
     def gains(self) -> list[int]:
@@ -199,10 +210,13 @@ class NodeLookup:
         gain: NDArray[np.uint16],
         shape: NDArray[np.uint16],
         scale: float,
+        reciprocal: bool = True,
+        mirrored: bool = False,
+        signed: bool = False,
     ) -> None:
-        """theta_h, band, theta_d, phi_d: the fields of the `NodeLattice`. gains (G,), shapes (S, 3), gain (nodes,) and
-        shape (nodes,): y of a node is gains[gain] · shapes[shape]. scale: of the cube-root domain. Raises ValueError
-        for what does not fit.
+        """theta_h, band, theta_d, phi_d, reciprocal, mirrored: the fields of the `NodeLattice`. gains (G,), shapes
+        (S, 3), gain (nodes,) and shape (nodes,): y of a node is gains[gain] · shapes[shape]. scale, signed: see
+        `nodes.from_cube_root`. Raises ValueError for what does not fit.
         """
 
     def eval(

@@ -8,20 +8,21 @@ from pathlib import Path
 import compact
 import numpy as np
 import pytest
-from compact import arrays, broken, same_numbers, scale, sealed
+from compact import FOLDS, arrays, broken, same_numbers, scale, sealed, signed
 from helpers import SMALL, lambertian_table, must_fail, random_directions
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sommerl import Lattice, SomManBrdf, SommerlError, TrainOptions, load, save, train
 from sommerl.compression.palette import GainsAndShapes
-from sommerl.compression.smrl.file import CELLS_HEAD, NODES_HEAD, decode, encode
+from sommerl.compression.smrl.file import CELLS_HEAD, SCALE, decode, encode
 from sommerl.reflectance.nodes import NodeLattice
 from sommerl.reflectance.origin import Source
 from sommerl.system.errors import FormatError, MaterialError, OptionError
 from sommerl.system.sealed_file import PREFIX
 
 KINDS = ("cells", "nodes")
+IN_EACH = [(folds, signed) for folds in FOLDS for signed in (False, True)]
 GOLDEN = Path(__file__).parents[1] / "golden"
 A, B = random_directions(20, 1), random_directions(20, 2)
 
@@ -93,11 +94,34 @@ def test_round_trip(material, tmp_path):
 
 
 @pytest.mark.parametrize("case", compact.CASES)
-def test_round_trip_of_nodes(case):
-    before = compact.material(case, 1)
+@pytest.mark.parametrize(("folds", "signed"), IN_EACH)
+def test_round_trip_of_nodes(case, folds, signed):
+    before = compact.material(case, 1, folds=FOLDS[folds], signed=signed)
     after = decode(encode(before))
     check_round_trip(before, after)
     assert np.array_equal(after.eval(A, B), before.eval(A, B))
+    before.palette.signed = not signed
+    must_fail(check_round_trip, before, after)
+
+
+def check_versions(data, kind):
+    assert struct.unpack_from("<4sH", data) == (b"SMRL", {"cells": 1, "nodes": 2}[kind])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_nodes_are_written_as_version_2_and_cells_as_version_1(kind):
+    check_versions(encode(made(kind)), kind)
+    must_fail(check_versions, compact.in_version_1(made("nodes")), "nodes")
+
+
+@pytest.mark.parametrize("case", compact.CASES)
+def test_version_1_is_read(case):
+    before = compact.material(case, 2)
+    data = compact.in_version_1(before)
+    assert data[4] == 1
+    check_round_trip(before, decode(data))
+    other = compact.material(case, 2, folds=FOLDS["neither"])
+    must_fail(check_round_trip, other, decode(data))
 
 
 @pytest.mark.parametrize("lattice", [Lattice(1, 1, 1), Lattice(1, 2, 1, False), Lattice(5, 4, 3, False), SMALL])
@@ -126,32 +150,50 @@ def test_the_same_material_gives_the_same_bytes(small_table):
 def numbers(material):
     """The SHA-256 of all that a lookup reads."""
     lattice = material.lattice.axes() if not material.grid else (*material.lattice.shape, material.lattice.reciprocal)
-    head = json.dumps([lattice, material.interpolation, scale(material).hex()])
+    said = [lattice, material.interpolation, scale(material).hex()]
+    flags = PLAIN if material.grid else [*material.lattice.folds.values(), signed(material)]
+    said += flags if flags != PLAIN else []
+    head = json.dumps(said)
     return hashlib.sha256(head.encode() + b"".join(part.tobytes() for part in arrays(material))).hexdigest()
 
 
+PLAIN = [True, False, False]  # reciprocal, mirrored, signed, as all of version 1
 NUMBERS = {
     "cells": "913e749eb881f4fccfa484c0a99302f08a75242e85d66e9bce20b580e9857493",
     "nodes": "a615619ef7e248e2ccb59cd9e6e8ff0db66fdc3e74a35be52f621df69ace5c94",
+    "nodes-2-reciprocal": "4e0137585f3ec6336271205c83626530a14ce09f574524aad8c817e323a816e5",
+    "nodes-2-mirrored": "3117e099ad510cb6f695ec253afc2e08b7626b2b7f15ae649365c3eb8d7381ec",
+    "nodes-2-both": "f9fe55657cdaa9bbdb562dc079310dfded580587a66d21f416ccbd2f57ea945c",
+    "nodes-2-neither": "43849f1ab1cfc43bc00dc87a909ca5fbd3a5900a32225ce38a9d1e493607feb2",
 }
 
 
-def check_golden(data, kind):
+def check_golden(data, name):
     material = decode(data)
-    assert numbers(material) == NUMBERS[kind]
-    if kind == "nodes":  # zlib's bytes may change; these may not
+    assert numbers(material) == NUMBERS[name]
+    if name.startswith("nodes-2"):  # zlib's bytes may change; these may not
         assert encode(material) == data
+    if name == "nodes":  # which nobody writes any more
+        assert compact.in_version_1(material) == data
+        assert numbers(decode(encode(material))) == NUMBERS[name]
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_golden_files(kind):
-    """Files of format 1 from when it became stable: they are never to be written anew."""
-    data = (GOLDEN / f"{kind}.smrl").read_bytes()
-    check_golden(data, kind)
-    must_fail(check_golden, encode(made(kind)), kind)
+@pytest.mark.parametrize("name", NUMBERS)
+def test_golden_files(name):
+    """Files from when each format became stable: they are never to be written anew."""
+    data, kind = (GOLDEN / f"{name}.smrl").read_bytes(), name.split("-")[0]
+    check_golden(data, name)
+    must_fail(check_golden, encode(made(kind)), name)
     material = decode(data)
     assert material.name.startswith(f"golden {kind}")
     assert len(material.source.sha256) == 64
+
+
+@pytest.mark.parametrize("name", FOLDS)
+def test_golden_files_of_version_2_are_those_of_the_generator(name):
+    made = decode((GOLDEN / f"nodes-2-{name}.smrl").read_bytes())
+    check_round_trip(compact.golden(name), made)
+    must_fail(check_round_trip, compact.golden("both" if name != "both" else "neither"), made)
 
 
 def check_damage_is_named(data, path):
@@ -198,6 +240,16 @@ def test_broken_files_with_a_checksum_that_fits(material):
     must_fail(check_refused_or_usable, encode(material), read_without_care)
 
 
+@pytest.mark.parametrize("name", ["version 1", "mirrored", "both", "neither"])
+def test_broken_nodes_of_each_kind(name):
+    if name == "version 1":
+        data = compact.in_version_1(compact.material((2, 1, 3, 3, "walk"), 4))
+    else:
+        data = encode(compact.material((2, 1, 3, 3, "walk"), 4, folds=FOLDS[name], signed=True))
+    for each in broken(data[PREFIX.size :]):
+        check_refused_or_usable(sealed(each, data[4]))
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @settings(deadline=None, max_examples=100)
 @given(st.data())
@@ -209,9 +261,13 @@ def test_files_broken_at_several_places(kind, data):
 
 
 @settings(deadline=None, max_examples=100)
-@given(st.binary(max_size=80), st.sampled_from([b"\0\0\0\0\0", b"\1\0\0\0\0", b""]))
-def test_any_bytes(data, head):
-    check_refused_or_usable(sealed(head + data))
+@given(
+    st.binary(max_size=80),
+    st.sampled_from([b"\0\0\0\0\0", b"\1\0\0\0\0", b"\1\0\0\0\0\0\0\0\x3f", b""]),
+    st.sampled_from([1, 2]),
+)
+def test_any_bytes(data, head, version):
+    check_refused_or_usable(sealed(head + data, version))
 
 
 def check_nothing_may_follow(body, more):
@@ -231,14 +287,23 @@ def test_bytes_at_the_end_are_refused(material):
     must_fail(check_nothing_may_follow, body(material), b"")
 
 
-@pytest.mark.parametrize("version", [0, 2, 7, 65535])
+@pytest.mark.parametrize("version", [0, 3, 7, 65535])
 def test_other_versions_are_refused_by_name(material, version):
     """Before anything else: their checksum may be another."""
     for contents in (body(material), b""):
         data = sealed(contents, version)
         for each in (data, data[:6] + bytes(4) + data[10:]):
-            with pytest.raises(FormatError, match=f"expected version 1, found version {version};"):
+            with pytest.raises(FormatError, match=f"expected version 1 or 2, found version {version};"):
                 decode(each)
+
+
+def test_cells_are_of_version_1_alone():
+    assert decode(sealed(body(made("cells")), 1)).grid
+    with pytest.raises(FormatError, match="expected kind 1, found 0"):
+        decode(sealed(body(made("cells")), 2))
+    for version, kinds in ((1, "0 or 1"), (2, "1")):
+        with pytest.raises(FormatError, match=f"expected kind {kinds}, found 2"):
+            decode(sealed(b"\2" + body(made("cells"))[1:], version))
 
 
 def test_other_files_are_refused():
@@ -289,7 +354,24 @@ def test_a_scale_that_is_none_is_refused(scale):
     stream, head = compact.stream(encode(made("nodes")))
     decode(sealed(head + stream))
     with pytest.raises(FormatError, match="positive scale"):
-        decode(sealed(head[:-4] + NODES_HEAD.pack(scale) + stream))
+        decode(sealed(head[:-5] + SCALE.pack(scale) + head[-1:] + stream))
+    stream, head = compact.stream(compact.in_version_1(made("nodes")))
+    decode(sealed(head + stream, 1))
+    with pytest.raises(FormatError, match="positive scale"):
+        decode(sealed(head[:-4] + SCALE.pack(scale) + stream, 1))
+
+
+def test_flags():
+    stream, head = compact.stream(encode(compact.material("minimal")))
+    for flags in range(256):
+        data = sealed(head[:-1] + bytes([flags]) + stream)
+        if flags > 7:
+            with pytest.raises(FormatError, match=f"^expected flags from 0 to 7, found {flags}$"):
+                decode(data)
+        else:
+            found = decode(data)  # of a lattice with one node in φ_d, which means the same with all folds
+            assert (found.lattice.reciprocal, found.lattice.mirrored) == (flags & 1 > 0, flags & 2 > 0)
+            assert found.palette.signed == (flags & 4 > 0)
 
 
 def check_allocates(data, most):
@@ -345,6 +427,7 @@ def test_what_a_file_cannot_hold(material):
         (NodeLattice((0, 90, 180), (0, 1, 0), ((0, 180),) * 2, ((0,),) * 2), "bands in order"),
         (NodeLattice((*range(16), 180), tuple(range(17)), ((0, 180),) * 17, ((0,),) * 17), "bands in order"),
         (NodeLattice((0, 180), (0, 0), ((0, 180),), ((0,),)), None),
+        *((NodeLattice((0, 180), (0, 0), ((0, 180),), ((0,),), **folds), None) for folds in FOLDS.values()),
     ],
 )
 def test_lattices_that_cannot_be_written(lattice, what):
@@ -358,7 +441,8 @@ def test_lattices_that_cannot_be_written(lattice, what):
 
 
 def test_palettes_that_cannot_be_written():
-    for gains, lut in (([0.001], np.ones((1, 3))), ([0.0], np.full((1, 3), 0.9)), ([1.5, 0.5], np.ones((1, 3)))):
+    grey = np.ones((1, 3))
+    for gains, lut in (([0.001], grey), ([0.0], np.full((1, 3), 0.9)), ([1.5, 0.5], grey), ([-0.5, -1.5], grey)):
         index = np.zeros((2, 4), np.uint16)
         lattice = NodeLattice((0, 180), (0, 0), ((0, 180),), ((0,),))
         with pytest.raises(FormatError, match=r"x: .*palette"):

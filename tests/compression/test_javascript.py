@@ -10,7 +10,20 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from compact import CASES, HOSTILE_STREAMS, arrays, bomb, broken, material, scale, sealed, stream, written
+from compact import (
+    CASES,
+    FOLDS,
+    arrays,
+    bomb,
+    broken,
+    hostile_streams,
+    in_version_1,
+    material,
+    scale,
+    sealed,
+    signed,
+    stream,
+)
 from helpers import must_fail, tool
 from noted import FINE, NOT_PLAIN, with_notes
 
@@ -79,7 +92,8 @@ def described(made):
         axes = dict(zip(("thetaH", "thetaD", "phiD"), lattice.shape, strict=True))
         return known | {"kind": "cells", "lattice": axes | {"reciprocal": lattice.reciprocal}}
     axes = dict(zip(("thetaH", "band", "thetaD", "phiD"), lattice.axes(), strict=True))
-    return known | {"kind": "nodes", "lattice": axes, "gains": gains, "gainIndex": gain_index}
+    known |= {"kind": "nodes", "lattice": axes | lattice.folds, "signed": signed(made)}
+    return known | {"gains": gains, "gainIndex": gain_index}
 
 
 def check_same(found, wanted):
@@ -89,12 +103,18 @@ def check_same(found, wanted):
 
 
 def test_the_same_numbers_bit_for_bit(node):
-    made = [material(case, seed) for case in CASES for seed in range(2)]
+    first = [material(case, seed) for case in CASES for seed in range(2)]
+    made = first + [
+        material(case, 2, folds=folds, signed=n % 2 > 0) for case in CASES for n, folds in enumerate(FOLDS.values())
+    ]
     made += [cells(9, Lattice(4, 5, 6)), cells(256, Lattice(9, 8, 7), "trilinear"), cells(257, Lattice(9, 9, 18))]
     made += [cells(5, Lattice(4, 32, 5, reciprocal=False)), cells(2, Lattice(1, 1, 1)), cells(300, Lattice())]
-    made += [decode(path.read_bytes()) for path in sorted(GOLDEN.glob("*.smrl"))]
+    golden = [path.read_bytes() for path in sorted(GOLDEN.glob("*.smrl"))]
+    made += map(decode, golden)
     found, wanted = node(map(encode, made)), list(map(described, made))
     check_same(found, wanted)
+    check_same(node(golden), wanted[-len(golden) :])
+    check_same(node(map(in_version_1, first)), wanted[: len(first)])
     made[0].lut[0, 0] += 2.0**-50
     must_fail(check_same, found, list(map(described, made)))
 
@@ -110,8 +130,8 @@ def read(data):
 def read_plainly(data):
     """The same with the decoder of streams in plain Python."""
 
-    def decoded(stream):
-        *axes, gains, shapes, gain, shape = reference_codec.decode(stream)
+    def decoded(stream, reciprocal, mirrored, version):
+        *axes, gains, shapes, gain, shape = reference_codec.decode(stream, mirrored, version)
         names = ("theta_h", "band", "theta_d", "phi_d", "gains", "shapes")
         palette = SimpleNamespace(**dict(zip(names, (*axes, gains, shapes), strict=True)))
         return palette, tuple(np.array(index, np.uint16) for index in (gain, shape))
@@ -193,26 +213,46 @@ NOTES = [
 ]
 
 
-@pytest.mark.parametrize("kind", ["cells", "nodes"])
+# A material, and the version of its file.
+KINDS = {
+    "cells": (lambda: cells(3, Lattice(2, 2, 3)), 1),
+    "nodes of version 1": (lambda: material((2, 1, 3, 3, "walk"), 4), 1),
+    **{
+        name: (lambda folds=folds: material((2, 1, 3, 3, "walk"), 4, folds=folds, signed=True), 2)
+        for name, folds in FOLDS.items()
+    },
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_all_decoders_find_the_same_or_say_the_same(node, kind):
-    made = cells(3, Lattice(2, 2, 3)) if kind == "cells" else material((2, 1, 3, 3, "walk"), 4)
-    data = encode(made)
+    make, version = KINDS[kind]
+    made, nodes = make(), kind != "cells"
+    data = in_version_1(made) if nodes and version == 1 else encode(made)
     body = data[PREFIX.size :]
+
+    def closed(contents):
+        return sealed(contents, version)
+
     contents = [data[:-1], data + b"\0", b"", data[:20], data[:6], bytes(40)]
-    contents += [sealed(body, version) for version in (0, 2, 65535)]
-    contents += [sealed(body + more) for more in (b"\0", b"\0\0", b"\xff" * 9)]
+    contents += [sealed(body, version) for version in (0, 3, 65535)]
+    contents += [closed(body + more) for more in (b"\0", b"\0\0", b"\xff" * 9)]
     contents += [noted(notes, made) for notes in NOTES]
-    contents += map(sealed, (*broken(body), *mutated(body, 800, 1)))
-    if kind == "nodes":
+    contents += map(closed, (*broken(body), *mutated(body, 800, 1)))
+    contents += [sealed(body, 3 - version), closed(b"\2" + body[1:]), closed(bytes([not nodes]) + body[1:])]
+    if nodes:
         stream_, head = stream(data)
-        streams = [written(**numbers) for numbers in HOSTILE_STREAMS.values()]
-        contents += [sealed(head + each) for each in (*streams, *mutated(stream_, 400, 2))]
-        contents += [sealed(head[:-4] + struct.pack("<f", scale) + stream_) for scale in (0, -1, np.nan, np.inf, 1e-45)]
+        streams = hostile_streams(version, made.lattice.mirrored).values()
+        contents += [closed(head + each) for each in (*streams, *mutated(stream_, 400, 2))]
+        before, flags = (head[:-4], b"") if version == 1 else (head[:-5], head[-1:])
+        scales = [struct.pack("<f", scale) for scale in (0, -1, np.nan, np.inf, 1e-45)]
+        contents += [closed(before + scale + flags + stream_) for scale in scales]
+        contents += [closed(head[:-1] + bytes([flags]) + stream_) for flags in (*range(10), 255)]
     found, wanted = node(contents), list(map(read, contents))
     check_same(found, wanted)
-    if kind == "nodes":
+    if nodes:
         check_same(list(map(read_plainly, contents)), wanted)
-        check_same(node([sealed(head + bomb())]), [read(sealed(head + bomb()))])
+        check_same(node([closed(head + bomb())]), [read(closed(head + bomb()))])
     assert all(isinstance(each, str) and "\n" not in each for each in wanted[:12])
     assert len({each for each in wanted if isinstance(each, str)}) > 12
     must_fail(check_same, found, [described(made), *wanted[1:]])

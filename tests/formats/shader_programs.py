@@ -2,11 +2,14 @@
 
 import re
 import subprocess
+from dataclasses import replace
 
 import numpy as np
+from compact import FOLDS
 from helpers import compact_material, random_directions, tool
 
-from sommerl import BrdfTable, Lattice, TrainOptions, builtin, train
+from sommerl import BrdfTable, Lattice, SomManBrdf, TrainOptions, builtin, train
+from sommerl.compression.palette import GainsAndShapes
 from sommerl.reflectance.nodes import FINE, NodeLattice
 
 A, B = random_directions(10_000, 1), random_directions(10_000, 2)
@@ -51,11 +54,9 @@ CASES = [
 
 BANDS = [tuple(sorted({0, FINE, *range(b + 1, FINE, 7 * b + 9)})) for b in range(3)]
 ROWS = tuple(range(0, FINE + 1, 4))
+SEVERAL = NodeLattice((0, 1, 5, 88, 92, 120, 180), (0, 0, 1, 1, 2, 2, 2), tuple(BANDS), tuple(b[:-1] for b in BANDS))
 COMPACT = {
-    "several bands": (
-        NodeLattice((0, 1, 5, 88, 92, 120, 180), (0, 0, 1, 1, 2, 2, 2), tuple(BANDS), tuple(b[:-1] for b in BANDS)),
-        (20, 15),
-    ),
+    "several bands": (SEVERAL, (20, 15)),
     "one node in phi_d": (NodeLattice((0, 40, 90, 180), (0,) * 4, ((0, 60, 180),), ((0,),)), (7, 5)),
     "one gain and one shape": (NodeLattice((0, 180), (0, 1), ((0, 180),) * 2, ((0,), (0, 90, 179))), (1, 1)),
     "finest": (NodeLattice((0, 180), (0, 0), (tuple(range(FINE + 1)),), (tuple(range(FINE)),)), (300, 300)),
@@ -63,9 +64,28 @@ COMPACT = {
 }
 
 
+MIRRORED_BANDS = ((0, FINE), BANDS[1], (0,))
+FOLDED = {  # and whether blended values keep their sign
+    f"{name}{', signed' if signed else ''}": (
+        replace(SEVERAL, **folds, phi_d=MIRRORED_BANDS if folds["mirrored"] else SEVERAL.phi_d),
+        signed,
+    )
+    for name, folds in FOLDS.items()
+    for signed in (False, True)
+}
+
+
 def compact(case):
     lattice, palette = COMPACT[case]
     return compact_material(lattice, *palette)
+
+
+def folded(case):
+    """A material with such folds, half of whose gains are negative."""
+    lattice, signed = FOLDED[case]
+    made = compact_material(lattice, 20, 15)
+    gains = np.sort(np.concatenate([made.palette.gains[::2], -made.palette.gains[1::2]]))
+    return SomManBrdf(GainsAndShapes(gains, made.lut, 0.04, signed), made.index, lattice, name="folded")
 
 
 def run(folder, real, call="eval", a=A, b=B):

@@ -1,10 +1,11 @@
 import re
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from helpers import compact_material, must_fail, tool
-from shader_programs import CASES, COMPACT, A, B, compact, material, run, validate
+from shader_programs import CASES, COMPACT, FOLDED, A, B, compact, folded, material, run, validate
 
 from sommerl import BrdfTable, Lattice, SomManBrdf, builtin
 from sommerl.compression.palette import GainsAndShapes
@@ -39,6 +40,34 @@ def test_compact_materials_are_the_same_in_the_header(tmp_path, case):
     must_fail(check_like_python, broken, found)
 
 
+def check_same_bits(one, other):
+    assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize("case", FOLDED)
+def test_folded_materials_are_the_same_in_the_header(tmp_path, case):
+    brdf, (lattice, signed) = folded(case), FOLDED[case]
+    shader.write(brdf, tmp_path / "x.h")
+    found = run(tmp_path, "double")
+    check_like_python(brdf, found)
+    assert (found < 0).any() == signed
+    for broken in (
+        replace(lattice, reciprocal=not lattice.reciprocal),
+        replace(lattice, mirrored=not lattice.mirrored, phi_d=((0,),) * 3),
+    ):
+        index = brdf.index[:, : broken.size]
+        other = SomManBrdf(brdf.palette, index, broken, name="x")
+        must_fail(check_like_python, other, found)
+    mirror = [1, -1, 1]
+    images = ((B, A), lattice.reciprocal), ((A * mirror, B * mirror), lattice.mirrored)
+    for (a, b), same in images:
+        image = run(tmp_path, "double", a=a, b=b)
+        if same:
+            check_same_bits(image, found)
+        else:
+            must_fail(check_same_bits, image, found)
+
+
 def check_like_python_in_single_precision(brdf, found):
     expected = brdf.eval(A, B)
     away = np.abs(found - expected) - 1e-9  # where the blend is about 0, little is left of its digits
@@ -53,6 +82,22 @@ def test_compact_materials_in_single_precision(tmp_path, case):
     found = run(tmp_path, "float")
     check_like_python_in_single_precision(brdf, found)
     must_fail(check_like_python_in_single_precision, brdf, found * 1.0002)
+
+
+@pytest.mark.parametrize("case", FOLDED)
+def test_folded_materials_in_single_precision(tmp_path, case):
+    brdf = folded(case)
+    shader.write(brdf, tmp_path / "x.h")
+    found = run(tmp_path, "float")
+    check_folded_in_single_precision(brdf, found)
+    must_fail(check_folded_in_single_precision, brdf, -found if brdf.palette.signed else found * 1.01)
+
+
+def check_folded_in_single_precision(brdf, found):
+    """Differences of large numbers, whose cubes have few digits."""
+    expected = brdf.eval(A, B)
+    away = np.abs(found - expected) - 1e-6 * np.abs(expected).max()
+    assert (away <= 1e-3 * np.abs(expected)).all(axis=-1).mean() > 0.999
 
 
 def check_small(path, brdf):
@@ -154,6 +199,12 @@ def test_shaders_of_compact_materials_compile(tmp_path, case, extension, text, o
     check_shaders_compile(tmp_path, compact(case), material(*CASES[3]), extension, text, options)
 
 
+@pytest.mark.parametrize("case", FOLDED)
+@SHADERS
+def test_shaders_of_folded_materials_compile(tmp_path, case, extension, text, options):
+    check_shaders_compile(tmp_path, folded(case), compact("several bands"), extension, text, options)
+
+
 WEBGL = re.sub(r"layout\(.*\) ", "", GLSL_PROGRAM).replace(
     "450", "300 es\nprecision highp float;\nprecision highp int;"
 )
@@ -199,7 +250,15 @@ def check_is_filled_in(text):
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
-@pytest.mark.parametrize("made", [lambda: material(*CASES[0]), lambda: material(*CASES[4]), lambda: compact("big")])
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda: material(*CASES[0]),
+        lambda: material(*CASES[4]),
+        lambda: compact("big"),
+        lambda: folded("both, signed"),
+    ],
+)
 def test_nothing_is_left_of_the_templates_marks(made, language, monkeypatch):
     brdf = made()
     check_is_filled_in(shader.source(brdf, language, "x"))

@@ -110,16 +110,18 @@ class Reflectances(Palette):
 class GainsAndShapes(Palette):
     """The palette of the preset `compact`, for nodes: gain times shape is a value y in the cube-root domain.
 
-    gains: (G,), not negative. lut: the shapes, (S, 3), whose mean is 1. scale: of the domain; see
-    `nodes.from_cube_root`. index: unsigned, (2, nodes): of each node, the number of its gain and of its shape.
+    gains: (G,). lut: the shapes, (S, 3), whose mean is 1. scale: of the domain; see `nodes.from_cube_root`. signed:
+    whether blended values below 0 give negative reflectances, and not 0. index: unsigned, (2, nodes): of each node, the
+    number of its gain and of its shape.
     """
 
     domain = "cube-root"
 
-    def __init__(self, gains: ArrayLike, shapes: ArrayLike, scale: float) -> None:
+    def __init__(self, gains: ArrayLike, shapes: ArrayLike, scale: float, signed: bool = False) -> None:
         self.gains = np.array(gains, np.float64)
         self.lut = np.array(shapes, np.float64)
         self.scale = float(np.float32(scale))  # as a file holds it
+        self.signed = signed
 
     @property
     def entries(self) -> int:
@@ -135,8 +137,8 @@ class GainsAndShapes(Palette):
         for part, rows, entries in (("gains", index[0], len(self.gains)), ("shapes", index[1], len(self.lut))):
             if rows.max() >= entries:
                 raise MaterialError(f"{name}: {part}: expected indices below {entries}, found {rows.max()}")
-        if not (np.isfinite(self.gains).all() and (self.gains >= 0).all() and 0 < self.scale < np.inf):
-            raise MaterialError(f"{name}: expected gains that are not negative, and a positive scale, found others")
+        if not (np.isfinite(self.gains).all() and 0 < self.scale < np.inf):
+            raise MaterialError(f"{name}: expected finite gains, and a positive scale, found others")
         return index.astype(np.uint16)
 
     def stored(self, index: NDArray[Any]) -> NDArray[np.float64]:
@@ -155,12 +157,13 @@ class GainsAndShapes(Palette):
         return gain * r, gain * g, gain * b
 
     def reflectance(self, value: Triple, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
-        return from_cube_root(value, wi, wo, buffers["scale"])
+        return from_cube_root(value, wi, wo, buffers["scale"], self.signed)
 
     def native(self, index: NDArray[Any], lattice: AnyLattice, interpolation: Interpolation) -> Native:
         gain, shape = index
-        axes = _nodes("palette", lattice).axes()
-        return _core.NodeLookup(*axes, self.gains, self.lut, gain, shape, self.scale)
+        nodes = _nodes("palette", lattice)
+        entries = self.gains, self.lut, gain, shape, self.scale
+        return _core.NodeLookup(*nodes.axes(), *entries, **nodes.folds, signed=self.signed)
 
 
 def _check_lut(name: str, lut: NDArray[np.float64]) -> None:

@@ -64,7 +64,7 @@ def encode(material: FactoredBrdf) -> bytes:
 
 def decode(data: bytes) -> FactoredBrdf:
     """Reads a factored BRDF from the bytes of a file. Raises FormatError if they are not a valid file."""
-    reader = sealed_file.opened(data, MAGIC, VERSION, "factored BRDF (.fbrdf)")
+    _, reader = sealed_file.opened(data, MAGIC, VERSION, "factored BRDF (.fbrdf)")
     try:
         return _material(reader)
     except FormatError:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..system.errors import MaterialError
 from .arrays import Array, Triple, ops
-from .half_diff import TWO_PI, half_diff
+from .half_diff import TWO_PI, half_diff, phi_d_range
 from .lattice import AnyLattice, Interpolation
 
 HALF_PI = TWO_PI / 4
@@ -61,7 +61,7 @@ class Lattice(AnyLattice):
     @property
     def phi_d_range(self) -> float:
         """The period of φ_d [rad]."""
-        return TWO_PI / 2 if self.reciprocal else TWO_PI
+        return phi_d_range(self.reciprocal)
 
     def axes(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """(θ_h, θ_d, φ_d) [rad] at the centres of the bins, of shapes that broadcast to the lattice's."""

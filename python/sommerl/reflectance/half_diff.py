@@ -9,12 +9,16 @@ from __future__ import annotations
 from .arrays import Array, Triple, ops
 
 
-def half_diff(wi: Triple, wo: Triple, reciprocal: bool = True) -> Triple:
+def half_diff(wi: Triple, wo: Triple, reciprocal: bool = True, mirrored: bool = False) -> Triple:
     """Half/difference angles of pairs of unit directions in the surface frame.
 
     wi, wo: components (x, y, z) to the light and to the viewer, arrays of any one shape.
-    reciprocal: swapping wi and wo adds π to φ_d; when true, φ_d is folded to [0, π], and the result is the
-        same, bit for bit, for both orders. When false, φ_d lies in [0, 2π).
+    reciprocal: swapping wi and wo adds π to φ_d; when true, φ_d is folded to half of its range, and the result is
+        the same, bit for bit, for both orders.
+    mirrored: a reflection of both in a plane through the normal changes the sign of φ_d; when true, φ_d is folded to
+        half of its range, and the result is the same, bit for bit, for y of both negated.
+
+    φ_d lies in [0, 2π), or in [0, `phi_d_range`] if folded.
 
     Returns (theta_h, theta_d, phi_d) [rad]; θ_h and θ_d lie in [0, π/2]. φ_d is 0 where θ_h is.
 
@@ -31,13 +35,20 @@ def half_diff(wi: Triple, wo: Triple, reciprocal: bool = True) -> Triple:
     theta_d = f.atan2(v, s)
     x = 0.0 - vz * s  # the zero turns -0 into 0, whose atan2 would be π
     y = (vy * sx - vx * sy) + 0.0
-    if reciprocal:
+    if mirrored:
+        phi_d = f.atan2(abs(y), abs(x) if reciprocal else x)
+    elif reciprocal:
         other = (y < 0.0) | ((y == 0.0) & (x < 0.0))
         phi_d = f.atan2(f.where(other, -y, y), f.where(other, -x, x) + 0.0)
     else:
         phi_d = f.atan2(y, x)
         phi_d = f.where(phi_d < 0.0, phi_d + TWO_PI, phi_d)
     return theta_h, theta_d, phi_d
+
+
+def phi_d_range(reciprocal: bool, mirrored: bool = False) -> float:
+    """The range of φ_d [rad] that `half_diff` leaves of 2π."""
+    return TWO_PI / (2 if reciprocal else 1) / (2 if mirrored else 1)
 
 
 def directions(theta_h: Array, theta_d: Array, phi_d: Array) -> tuple[Triple, Triple]:

@@ -1,8 +1,9 @@
 """A lattice of nodes in half/difference angles whose places are chosen for one material.
 
 Where `Lattice` has bins of one size, this one has nodes where the material bends. Places are on a fine grid: θ_h in
-steps of √(θ_h / 90°), 1/360 each up to 1/4 and 1/120 each from there, θ_d in 90°/180, φ_d in 180°/180. Rows of equal
-θ_h are gathered in bands; the rows of a band share their nodes in θ_d and φ_d. A lookup blends 8 nodes at most.
+steps of √(θ_h / 90°), 1/360 each up to 1/4 and 1/120 each from there, θ_d in 90°/180, φ_d in 180ths of its range. Rows
+of equal θ_h are gathered in bands; the rows of a band share their nodes in θ_d and φ_d. A lookup blends 8 nodes at
+most.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..system.errors import MaterialError
 from .arrays import Array, Triple, ops
-from .half_diff import TWO_PI, half_diff
+from .half_diff import TWO_PI, half_diff, phi_d_range
 from .lattice import AnyLattice, Interpolation
 
 FINE = 180  # steps of each axis
@@ -33,24 +34,28 @@ class NodeLattice(AnyLattice):
 
     theta_h: of each row, increasing, the first 0 and the last FINE. band: the number of the band that each row belongs
         to. theta_d: of the nodes of each band, increasing, the first 0 and the last FINE. phi_d: of the nodes of each
-        band, increasing, the first 0 and the last below FINE; since φ_d turns, the first one follows the last.
+        band, increasing, the first 0 and the last below FINE; since φ_d turns, the first one follows the last. If
+        mirrored, φ_d ends: the last is FINE, or there is none but 0, where all is constant in φ_d.
+    reciprocal: whether both orders of the directions give the same. mirrored: whether φ_d and −φ_d do. FINE steps are
+        `phi_d_range` of the two.
 
-    A lookup is reciprocal: φ_d covers [0, π). Raises MaterialError for axes that are not like that.
+    Raises MaterialError for axes that are not like that.
     """
 
     theta_h: tuple[int, ...]
     band: tuple[int, ...]
     theta_d: tuple[tuple[int, ...], ...]
     phi_d: tuple[tuple[int, ...], ...]
+    reciprocal: bool = True
+    mirrored: bool = False
     interpolations: ClassVar[tuple[Interpolation, ...]] = ("trilinear",)
-    reciprocal: ClassVar[bool] = True  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def __post_init__(self) -> None:
         bands = sorted(set(self.band))
         whole = all(_spans(axis, FINE) for axis in (self.theta_h, *self.theta_d))
-        turns = all(axis and axis[0] == 0 and axis[-1] < FINE and _increases(axis) for axis in self.phi_d)
+        phi_d = all(_turns_back(axis) if self.mirrored else _turns(axis) for axis in self.phi_d)
         counted = len(self.band) == len(self.theta_h) and bands == list(range(len(self.theta_d)))
-        if not (whole and turns and counted and len(self.theta_d) == len(self.phi_d)):
+        if not (whole and phi_d and counted and len(self.theta_d) == len(self.phi_d)):
             raise MaterialError(f"nodes: expected axes that increase from 0 to {FINE}, and a band for each row")
 
     @cached_property
@@ -81,8 +86,8 @@ class NodeLattice(AnyLattice):
             "row_place": np.array(self.theta_h, np.float64),
             "theta_d_below": np.concatenate([_below(axis) for axis in self.theta_d]),
             "theta_d_place": _padded(self.theta_d),
-            "phi_d_below": np.concatenate([_below((*axis, FINE)) for axis in self.phi_d]),
-            "phi_d_place": _padded([(*axis, FINE) for axis in self.phi_d]),
+            "phi_d_below": np.concatenate([_below(_whole(axis)) for axis in self.phi_d]),
+            "phi_d_place": _padded([_whole(axis) for axis in self.phi_d]),
             "phi_d_count": np.array([len(axis) for axis in self.phi_d], np.uint8),
         }
 
@@ -95,9 +100,13 @@ class NodeLattice(AnyLattice):
         """theta_h, band, theta_d, phi_d, as the core takes them."""
         return list(self.theta_h), list(self.band), [*map(list, self.theta_d)], [*map(list, self.phi_d)]
 
+    @property
+    def folds(self) -> dict[str, bool]:
+        """reciprocal and mirrored, by name, as the core, `place` and `angles_at` take them."""
+        return {"reciprocal": self.reciprocal, "mirrored": self.mirrored}
+
     def place(self, wi: Triple, wo: Triple) -> Triple:
-        """Where pairs of directions lie on the fine grid."""
-        return place(wi, wo)
+        return place(wi, wo, **self.folds)
 
     def corners(self, x: Array, y: Array, z: Array, buffers: Mapping[str, Any]) -> list[tuple[Array, Array]]:
         """The 8 nodes about a place on the fine grid (θ_h, θ_d, φ_d), and their weights, which add up to 1."""
@@ -120,21 +129,23 @@ class NodeLattice(AnyLattice):
         return found
 
 
-def place(wi: Triple, wo: Triple) -> Triple:
-    """Where pairs of directions lie on the fine grid."""
+def place(wi: Triple, wo: Triple, reciprocal: bool = True, mirrored: bool = False) -> Triple:
+    """Where pairs of directions lie on the fine grid of lattices with such folds."""
     f = ops(wi[0])
-    theta_h, theta_d, phi_d = half_diff(wi, wo)
+    theta_h, theta_d, phi_d = half_diff(wi, wo, reciprocal, mirrored)
     a = f.sqrt(theta_h * (1 / HALF_PI))
     x = f.where(a < KNEE / BELOW, a * BELOW, KNEE + (a - KNEE / BELOW) * ABOVE)
-    z = phi_d * (FINE / (2 * HALF_PI))
-    return x, theta_d * (FINE / HALF_PI), f.where(z >= FINE, z - FINE, z)
+    z = phi_d * (FINE / phi_d_range(reciprocal, mirrored))
+    if not mirrored:
+        z = f.where(z >= FINE, z - FINE, z)
+    return x, theta_d * (FINE / HALF_PI), z
 
 
-def angles_at(x: Array, y: Array, z: Array) -> Triple:
-    """(θ_h, θ_d, φ_d) [rad] at a place on the fine grid."""
+def angles_at(x: Array, y: Array, z: Array, reciprocal: bool = True, mirrored: bool = False) -> Triple:
+    """(θ_h, θ_d, φ_d) [rad] at a place on the fine grid of lattices with such folds."""
     f = ops(x)
     a = f.where(x < KNEE, x / BELOW, KNEE / BELOW + (x - KNEE) / ABOVE)
-    return a * a * HALF_PI, y * (HALF_PI / FINE), z * (2 * HALF_PI / FINE)
+    return a * a * HALF_PI, y * (HALF_PI / FINE), z * (phi_d_range(reciprocal, mirrored) / FINE)
 
 
 def damped(wi: Triple, wo: Triple) -> Array:
@@ -143,14 +154,14 @@ def damped(wi: Triple, wo: Triple) -> Array:
     return f.maximum(wi[2], SMALLEST_COSINE) * f.maximum(wo[2], SMALLEST_COSINE)
 
 
-def from_cube_root(y: Triple, wi: Triple, wo: Triple, scale: Array) -> Triple:
-    """f_r of values y in the cube-root domain: scale · max(0, y)³ / `damped`."""
+def from_cube_root(y: Triple, wi: Triple, wo: Triple, scale: Array, signed: bool = False) -> Triple:
+    """f_r of values y in the cube-root domain: scale · max(0, y)³ / `damped`, or scale · y³ / `damped` if signed."""
     f = ops(wi[0])
     factor = scale / damped(wi, wo)
 
     def channel(value: Array) -> Array:
-        above = f.maximum(value, 0.0)
-        return above * above * above * factor
+        root = value if signed else f.maximum(value, 0.0)
+        return root * root * root * factor
 
     return channel(y[0]), channel(y[1]), channel(y[2])
 
@@ -161,6 +172,21 @@ def _increases(axis: tuple[int, ...]) -> bool:
 
 def _spans(axis: tuple[int, ...], end: int) -> bool:
     return len(axis) > 1 and axis[0] == 0 and axis[-1] == end and _increases(axis)
+
+
+def _turns(axis: tuple[int, ...]) -> bool:
+    return len(axis) > 0 and axis[0] == 0 and axis[-1] < FINE and _increases(axis)
+
+
+def _turns_back(axis: tuple[int, ...]) -> bool:
+    return axis == (0,) or _spans(axis, FINE)
+
+
+def _whole(axis: tuple[int, ...]) -> tuple[int, ...]:
+    """An axis of φ_d up to FINE, where the first node comes again if no other one is there. Where it is the only one of
+    an axis that does not turn, it comes again, too.
+    """
+    return axis if axis[-1] == FINE else (*axis, FINE)
 
 
 def _below(axis: tuple[int, ...]) -> NDArray[np.uint8]:

@@ -54,28 +54,33 @@ def write_sealed(out: BinaryIO, magic: bytes, version: int, parts: Sequence[Any]
         out.write(part)
 
 
-def opened(data: bytes, magic: bytes, version: int, kind: str) -> Reader:
-    """Checks the head of a file's bytes, and returns a reader of its body.
+def opened(data: bytes, magic: bytes, newest: int, kind: str) -> tuple[int, Reader]:
+    """Checks the head of a file's bytes, and returns its version and a reader of its body.
 
-    kind: what the file should be, for the error message. Raises FormatError if the file is of another kind or version,
-    or damaged.
+    newest: the last of the versions that are read, of which 1 is the first. kind: what the file should be, for the
+    error message. Raises FormatError if the file is of another kind or version, or damaged.
     """
-    check(zlib.crc32(memoryview(data)[PREFIX.size :]), data, magic, version, kind)
-    return Reader(data, PREFIX.size)
+    version = check(zlib.crc32(memoryview(data)[PREFIX.size :]), data, magic, newest, kind)
+    return version, Reader(data, PREFIX.size)
 
 
-def check(crc: int, data: bytes, magic: bytes, version: int, kind: str) -> None:
-    """Raises FormatError as `opened` does. data: begins with the head. crc: checksum of all bytes after the head."""
+def check(crc: int, data: bytes, magic: bytes, newest: int, kind: str) -> int:
+    """The version of a file. Raises FormatError as `opened` does.
+
+    data: begins with the head. crc: checksum of all bytes after the head.
+    """
     if len(data) < PREFIX.size:
         raise FormatError(f"expected at least {PREFIX.size} bytes, found {len(data)}")
     found_magic, found_version, expected = PREFIX.unpack_from(data)
     if found_magic != magic:
         raise FormatError(f"expected a {kind}, found another kind")
-    if found_version != version:
-        hint = "a newer Sommerl may read it" if found_version > version else "make it from its source again"
-        raise FormatError(f"expected version {version}, found version {found_version}; {hint}")
+    if not 1 <= found_version <= newest:
+        hint = "a newer Sommerl may read it" if found_version > newest else "make it from its source again"
+        versions = " or ".join(map(str, range(1, newest + 1)))
+        raise FormatError(f"expected version {versions}, found version {found_version}; {hint}")
     if crc != expected:
         raise FormatError("expected the checksum in the file, found another: the file is damaged or cut off")
+    return int(found_version)
 
 
 def decode_file(path: Path, data: bytes, decode: Callable[[bytes], Material]) -> Material:

@@ -93,11 +93,15 @@ pub struct NodeLookup {
     gain: Py<PyAny>,
     shape: Py<PyAny>,
     scale: f64,
+    signed: bool,
 }
 
 #[pymethods]
 impl NodeLookup {
     #[new]
+    #[pyo3(signature = (
+        theta_h, band, theta_d, phi_d, gains, shapes, gain, shape, scale, reciprocal = true, mirrored = false, signed = false
+    ))]
     #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python,
@@ -110,6 +114,9 @@ impl NodeLookup {
         gain: Py<PyAny>,
         shape: Py<PyAny>,
         scale: f64,
+        reciprocal: bool,
+        mirrored: bool,
+        signed: bool,
     ) -> PyResult<Self> {
         guarded(|| {
             let lattice = NodeLattice {
@@ -117,10 +124,12 @@ impl NodeLookup {
                 band: small_numbers(&band, "band")?,
                 theta_d: small_numbers(&theta_d, "theta_d")?,
                 phi_d: small_numbers(&phi_d, "phi_d")?,
+                reciprocal,
+                mirrored,
             };
             let steps = NodeSteps::new(&lattice)
                 .ok_or_else(|| invalid("nodes: expected axes that increase from 0 to 180, and a band for each row"))?;
-            let made = NodeLookup { steps, gains, shapes, gain, shape, scale };
+            let made = NodeLookup { steps, gains, shapes, gain, shape, scale, signed };
             let fits = made.with_factors(py, |factors| Ok(factors.fit(made.steps.nodes())))?;
             if !fits || !scale.is_finite() {
                 return Err(invalid("expected a finite gain, shape and scale for each node"));
@@ -141,7 +150,8 @@ impl NodeLookup {
         guarded(|| {
             let pairs = Pairs::new(&wi, &wo)?;
             self.with_factors(py, |factors| {
-                let material = py.detach(|| NodeMaterial::new(&self.steps, factors, self.scale, pairs.wi.len()));
+                let (steps, count) = (&self.steps, pairs.wi.len());
+                let material = py.detach(|| NodeMaterial::new(steps, factors, self.scale, self.signed, count));
                 pairs.evaluated(py, &material, simd, threads)
             })
         })

@@ -4,7 +4,9 @@ use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1, ToP
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use sommerl_codec::{CompactMaterial, InstructionSet, NodeLattice, Palette, check_indices, decode, encode, measure};
+use sommerl_codec::{
+    CompactMaterial, InstructionSet, Layout, NodeLattice, Palette, check_indices, decode, encode, measure,
+};
 use sommerl_kernels::{Quadratic, Values, sweep};
 
 use crate::convert::{instruction_set, invalid, line, rows};
@@ -34,17 +36,21 @@ impl NodePalette {
 #[pymethods]
 impl NodePalette {
     #[new]
+    #[pyo3(signature = (theta_h, band, theta_d, phi_d, gains, shapes, reciprocal = true, mirrored = false))]
+    #[allow(clippy::too_many_arguments)]
     fn new(
         theta_h: Vec<u8>,
         band: Vec<u8>,
         theta_d: Vec<Vec<u8>>,
         phi_d: Vec<Vec<u8>>,
-        gains: Vec<u32>,
+        gains: Vec<i32>,
         shapes: Vec<[i32; 2]>,
+        reciprocal: bool,
+        mirrored: bool,
     ) -> PyResult<Self> {
         guarded(|| {
             let made = NodePalette {
-                lattice: NodeLattice { theta_h, band, theta_d, phi_d },
+                lattice: NodeLattice { theta_h, band, theta_d, phi_d, reciprocal, mirrored },
                 palette: Palette { gains, shapes },
             };
             made.lattice.check().map_err(invalid)?;
@@ -55,11 +61,24 @@ impl NodePalette {
 
     /// The material in a stream: lattice and palette, and each node's entries.
     #[staticmethod]
-    #[pyo3(signature = (data, simd = None))]
-    fn decode<'py>(py: Python<'py>, data: &[u8], simd: Option<&str>) -> PyResult<(Self, Indices<'py>)> {
+    #[pyo3(signature = (data, reciprocal, mirrored, version = 2, simd = None))]
+    fn decode<'py>(
+        py: Python<'py>,
+        data: &[u8],
+        reciprocal: bool,
+        mirrored: bool,
+        version: u16,
+        simd: Option<&str>,
+    ) -> PyResult<(Self, Indices<'py>)> {
         guarded(|| {
+            let layout = match (version, reciprocal, mirrored) {
+                (1, true, false) => Layout::First,
+                (2, ..) => Layout::Second { reciprocal, mirrored },
+                _ => return Err(invalid("expected version 2, or version 1 reciprocal and not mirrored")),
+            };
             let set = instruction_set(simd)?;
-            let CompactMaterial { lattice, palette, gain, shape } = py.detach(|| decode(data, set)).map_err(invalid)?;
+            let CompactMaterial { lattice, palette, gain, shape } =
+                py.detach(|| decode(data, layout, set)).map_err(invalid)?;
             Ok((NodePalette { lattice, palette }, (gain.to_pyarray(py), shape.to_pyarray(py))))
         })
     }
@@ -142,7 +161,17 @@ impl NodePalette {
     }
 
     #[getter]
-    fn gains(&self) -> Vec<u32> {
+    fn reciprocal(&self) -> bool {
+        self.lattice.reciprocal
+    }
+
+    #[getter]
+    fn mirrored(&self) -> bool {
+        self.lattice.mirrored
+    }
+
+    #[getter]
+    fn gains(&self) -> Vec<i32> {
         self.palette.gains.clone()
     }
 

@@ -25,8 +25,13 @@ pub enum Error {
     Gains(i64),
     /// The stream has a palette with this number of shapes, which is too many.
     Shapes(i64),
-    /// The stream has a gain with this code, which is too high.
-    GainCode(i64),
+    /// The stream has a gain with the code `found`, which is too high, or lower than `least`.
+    GainCode {
+        /// The lowest code that there is in this version of the format.
+        least: i64,
+        /// The code that the gain would have.
+        found: i64,
+    },
     /// The stream has a shape with a coordinate of this code, which is too low or too high.
     ShapeCode(i64),
     /// The stream leads the range decoder to a code that belongs to no symbol.
@@ -61,7 +66,7 @@ impl fmt::Display for Error {
             Error::Nodes(found) => range("nodes", 1, MOST_NODES as i64, found),
             Error::Gains(found) => range("gains", 1, entries, found),
             Error::Shapes(found) => range("shapes", 1, entries, found),
-            Error::GainCode(found) => range("gain", 0, i64::from(HIGHEST_GAIN) - 1, found),
+            Error::GainCode { least, found } => range("gain", least, i64::from(HIGHEST_GAIN), found),
             Error::ShapeCode(found) => range("shape", -widest, widest, found),
             Error::NoSymbol => {
                 f.write_str("stream: expected symbols of the range coder, found a code beyond all of them")

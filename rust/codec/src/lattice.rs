@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 
-/// Steps of each axis of the fine grid, on which nodes lie: from θ = 0 to 90° and from φ_d = 0 to 180°.
+/// Steps of each axis of the fine grid, on which nodes lie: from θ = 0 to 90°, and over the range of φ_d.
 pub const FINE: u8 = 180;
 /// What a file can hold.
 pub const MOST_BANDS: usize = 16;
@@ -10,6 +10,8 @@ pub const MOST_NODES: usize = 1 << 17;
 
 /// Places of nodes on the fine grid. Nodes of equal θ_h are a row; rows are in bands, and all rows of a band have the same places in
 /// θ_d and φ_d. Nodes are counted row by row, then by θ_d, then by φ_d.
+///
+/// The range of φ_d is 360°, half of that if the lattice is reciprocal, and again half if it is mirrored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NodeLattice {
     /// The place of each row: increasing from 0 to `FINE`.
@@ -18,19 +20,24 @@ pub struct NodeLattice {
     pub band: Vec<u8>,
     /// For each band, places that increase from 0 to `FINE`.
     pub theta_d: Vec<Vec<u8>>,
-    /// For each band, places that increase from 0 and end before `FINE`, where the first node comes again.
+    /// For each band, places that increase from 0: they end before `FINE`, where the first node comes again; or, if the lattice is
+    /// mirrored, at `FINE`, but for 0 alone, of what is constant in φ_d.
     pub phi_d: Vec<Vec<u8>>,
+    /// Whether both orders of the directions, φ_d and φ_d + 180°, give the same.
+    pub reciprocal: bool,
+    /// Whether φ_d and −φ_d give the same.
+    pub mirrored: bool,
 }
 
 impl NodeLattice {
     /// Whether all axes are as the fields say, each row has a band and each band has a row. The other functions may panic if not.
     pub fn is_valid(&self) -> bool {
-        let NodeLattice { theta_h, band, theta_d, phi_d } = self;
+        let NodeLattice { theta_h, band, theta_d, phi_d, mirrored, .. } = self;
         let closed = |axis: &Vec<u8>| increases(axis) && axis.len() > 1 && axis[axis.len() - 1] == FINE;
         let open = |axis: &Vec<u8>| increases(axis) && axis[axis.len() - 1] < FINE;
         closed(theta_h)
             && theta_d.iter().all(closed)
-            && phi_d.iter().all(open)
+            && phi_d.iter().all(|axis| if *mirrored { closed(axis) || axis == &[0] } else { open(axis) })
             && theta_d.len() == phi_d.len()
             && band.len() == theta_h.len()
             && band.iter().all(|&b| usize::from(b) < theta_d.len())

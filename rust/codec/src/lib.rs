@@ -1,8 +1,8 @@
 //! The stream that a compact material's file holds: its lattice of nodes, its palette of gains and shapes, and the entries that
-//! each node has. docs/format.md says what each bit means; this is format 1.
+//! each node has. docs/format.md says what each bit means. Format 2 is written, formats 1 and 2 are read.
 //!
 //! ```
-//! use sommerl_codec::{CompactMaterial, Error, InstructionSet, NodeLattice, Palette, decode, encode};
+//! use sommerl_codec::{CompactMaterial, Error, InstructionSet, Layout, NodeLattice, Palette, decode, encode};
 //!
 //! let material = CompactMaterial {
 //!     lattice: NodeLattice {
@@ -10,13 +10,16 @@
 //!         band: vec![0, 0],
 //!         theta_d: vec![vec![0, 180]],
 //!         phi_d: vec![vec![0]],
+//!         reciprocal: false,
+//!         mirrored: true,
 //!     },
-//!     palette: Palette { gains: vec![100, 200], shapes: vec![[0, 0]] },
+//!     palette: Palette { gains: vec![-100, 200], shapes: vec![[0, 0]] },
 //!     gain: vec![0, 1, 1, 0],
 //!     shape: vec![0; 4],
 //! };
 //! let stream = encode(&material, InstructionSet::fastest())?;
-//! assert_eq!(decode(&stream, InstructionSet::fastest())?, material);
+//! let layout = Layout::Second { reciprocal: false, mirrored: true };
+//! assert_eq!(decode(&stream, layout, InstructionSet::fastest())?, material);
 //! # Ok::<(), Error>(())
 //! ```
 
@@ -37,4 +40,4 @@ pub use model::Model;
 pub use palette::Palette;
 pub use range_coder::bits_of;
 pub use sommerl_simd::InstructionSet;
-pub use stream::{CompactMaterial, check_indices, decode, encode, measure};
+pub use stream::{CompactMaterial, Layout, check_indices, decode, encode, measure};

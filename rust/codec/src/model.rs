@@ -68,11 +68,12 @@ impl<'a> Model<'a> {
     /// A plane at the places of another band, by bilinear interpolation.
     fn moved(&self, plane: &Plane, from: usize, to: usize) -> Plane {
         let width = self.lattice.phi_d[from].len();
+        let way = if self.lattice.mirrored { between } else { around };
         let mut moved = Plane::default();
         for &y in &self.lattice.theta_d[to] {
             let (d0, d1, v) = between(&self.lattice.theta_d[from], y);
             for &x in &self.lattice.phi_d[to] {
-                let (p0, p1, u) = around(&self.lattice.phi_d[from], x);
+                let (p0, p1, u) = way(&self.lattice.phi_d[from], x);
                 let blend = |values: &[Node], c: usize| {
                     let low = values[d0 * width + p0][c] * (1.0 - u) + values[d0 * width + p1][c] * u;
                     let high = values[d1 * width + p0][c] * (1.0 - u) + values[d1 * width + p1][c] * u;
@@ -92,7 +93,7 @@ impl<'a> Model<'a> {
         let phi_d = &self.lattice.phi_d[band];
         let (width, height) = (phi_d.len(), self.lattice.theta_d[band].len());
         let (at, under) = (d * width + p, self.row > 0);
-        let [west, east] = [(p + width - 1) % width, (p + 1) % width].map(|q| d * width + q);
+        let [west, east] = beside(p, width, self.lattice.mirrored).map(|q| d * width + q);
         let mirror = (p > 0).then(|| FINE - phi_d[p]).filter(|&m| m <= phi_d[p - 1]);
         let mirror = mirror.map(|m| between(&phi_d[..p], m));
         let (now, above, higher) = (&self.present.values, &self.above.values, &self.higher.values);
@@ -177,6 +178,17 @@ impl<'a> Model<'a> {
         for (c, value) in values.into_iter().enumerate() {
             self.present.errors[at][c] = self.predictors[c].learn(value);
         }
+    }
+}
+
+/// The nodes next to node p in φ_d, which turns, or turns back at its ends if the lattice is mirrored.
+#[inline(always)]
+fn beside(p: usize, width: usize, mirrored: bool) -> [usize; 2] {
+    let last = width - 1;
+    if mirrored {
+        [if p > 0 { p - 1 } else { last.min(1) }, if p < last { p + 1 } else { last.saturating_sub(1) }]
+    } else {
+        [(p + last) % width, (p + 1) % width]
     }
 }
 

@@ -4,18 +4,18 @@ use crate::error::Error;
 
 /// What a file can hold.
 pub const MOST_ENTRIES: usize = 1 << 10;
-pub const HIGHEST_GAIN: u32 = 1 << 12;
+pub const HIGHEST_GAIN: i32 = (1 << 12) - 1;
 pub const WIDEST_SHAPE: i32 = 1 << 10;
 /// Gains whose codes differ by that are an octave apart.
-const OCTAVE: u32 = 128;
+const OCTAVE: f64 = 128.0;
 /// Coordinates of shapes whose codes differ by that are 1 apart.
 const UNIT: f64 = 64.0;
 
 /// Gains and shapes, by their codes: what a code stands for is in docs/format.md.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Palette {
-    /// Increasing.
-    pub gains: Vec<u32>,
+    /// Increasing. A negative code stands for minus what its opposite stands for.
+    pub gains: Vec<i32>,
     /// Two coordinates each, the first of which does not decrease from one shape to the next.
     pub shapes: Vec<[i32; 2]>,
 }
@@ -27,17 +27,16 @@ impl Palette {
         if ![gains.len(), shapes.len()].iter().all(|entries| (1..=MOST_ENTRIES).contains(entries)) {
             return Err(Error::PaletteSize);
         }
-        let increasing = gains.is_sorted_by(|a, b| a < b) && gains[gains.len() - 1] < HIGHEST_GAIN;
-        let ordered = shapes.is_sorted_by(|a, b| a[0] <= b[0]);
-        if !increasing || !ordered || !shapes.iter().flatten().all(|x| (-WIDEST_SHAPE..=WIDEST_SHAPE).contains(x)) {
-            return Err(Error::PaletteCodes);
-        }
-        Ok(())
+        let ordered = gains.is_sorted_by(|a, b| a < b) && shapes.is_sorted_by(|a, b| a[0] <= b[0]);
+        let within = |most: i32, code: &i32| (-most..=most).contains(code);
+        let gains = gains.iter().all(|code| within(HIGHEST_GAIN, code));
+        let shapes = shapes.iter().flatten().all(|code| within(WIDEST_SHAPE, code));
+        if ordered && gains && shapes { Ok(()) } else { Err(Error::PaletteCodes) }
     }
 
     /// What the model sees of the entries: the octave of each gain, and the first and the second coordinate of each shape.
     pub(crate) fn places(&self) -> [Vec<f64>; 3] {
-        let gains = self.gains.iter().map(|&code| f64::from(code) / f64::from(OCTAVE)).collect();
+        let gains = self.gains.iter().map(|&code| f64::from(code) / OCTAVE).collect();
         let [first, second] = [0, 1].map(|axis| self.shapes.iter().map(|s| f64::from(s[axis]) / UNIT).collect());
         [gains, first, second]
     }

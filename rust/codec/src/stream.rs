@@ -14,7 +14,36 @@ const MOST_REACHED: usize = 1 << 26;
 const REACHED_BY_ANY: usize = 1 << 22;
 const REACHED_A_BYTE: usize = 1 << 11;
 
-/// All of a compact material but its scale, which its file holds before the stream.
+/// The version of a stream, and which folds of φ_d its lattice has: what a file says before the stream.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// Format 1: reciprocal, not mirrored, and without negative gains. It is read, but not written any more.
+    First,
+    /// Format 2. The fields are those of the `NodeLattice`.
+    Second {
+        /// Whether both orders of the directions give the same.
+        reciprocal: bool,
+        /// Whether φ_d and −φ_d give the same.
+        mirrored: bool,
+    },
+}
+
+impl Layout {
+    /// That in which a lattice is written.
+    fn of(lattice: &NodeLattice) -> Layout {
+        Layout::Second { reciprocal: lattice.reciprocal, mirrored: lattice.mirrored }
+    }
+
+    /// Whether lattices are reciprocal, and whether they are mirrored.
+    fn folds(self) -> (bool, bool) {
+        match self {
+            Layout::First => (true, false),
+            Layout::Second { reciprocal, mirrored } => (reciprocal, mirrored),
+        }
+    }
+}
+
+/// All of a compact material but its scale and whether its blended values keep their sign, which its file holds before the stream.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CompactMaterial {
     /// Where the nodes are.
@@ -46,14 +75,19 @@ pub fn check_indices(lattice: &NodeLattice, palette: &Palette, gain: &[u16], sha
     if all { Ok(()) } else { Err(Error::Indices) }
 }
 
-/// The stream of a material: the same bytes with every instruction set. Gives `Error::Lattice`, `Error::PaletteSize`,
+/// The stream of a material, of format 2: the same bytes with every instruction set. Gives `Error::Lattice`, `Error::PaletteSize`,
 /// `Error::PaletteCodes` or `Error::Indices` for what is no material of this format; and `Error::Reached` for one that no reader would
 /// take, because it is too much work.
 pub fn encode(material: &CompactMaterial, set: InstructionSet) -> Result<Vec<u8>, Error> {
+    encode_as(Layout::of(&material.lattice), material, set)
+}
+
+/// The same in any layout that the material fits.
+pub(crate) fn encode_as(layout: Layout, material: &CompactMaterial, set: InstructionSet) -> Result<Vec<u8>, Error> {
     material.check()?;
     let mut coder = Encoder::new();
-    let lattice = lattice(&mut coder, Some(&material.lattice))?;
-    let palette = palette(&mut coder, Some(&material.palette))?;
+    let lattice = lattice(&mut coder, layout, Some(&material.lattice))?;
+    let palette = palette(&mut coder, layout, Some(&material.palette))?;
     let (mut gain, mut shape) = (material.gain.clone(), material.shape.clone());
     let reached = indices(set, &mut coder, &lattice, &palette, &mut gain, &mut shape, MOST_REACHED)?;
     let stream = coder.finish();
@@ -61,12 +95,12 @@ pub fn encode(material: &CompactMaterial, set: InstructionSet) -> Result<Vec<u8>
     Ok(stream)
 }
 
-/// The material of a stream. Gives an error for every stream that `encode` does not write, and neither panics nor takes long for
-/// any bytes.
-pub fn decode(data: &[u8], set: InstructionSet) -> Result<CompactMaterial, Error> {
+/// The material of a stream. Gives an error for every stream that is not the only one of a material, and neither panics nor takes
+/// long for any bytes.
+pub fn decode(data: &[u8], layout: Layout, set: InstructionSet) -> Result<CompactMaterial, Error> {
     let mut coder = Decoder::new(data);
-    let lattice = lattice(&mut coder, None)?;
-    let palette = palette(&mut coder, None)?;
+    let lattice = lattice(&mut coder, layout, None)?;
+    let palette = palette(&mut coder, layout, None)?;
     let (mut gain, mut shape) = (vec![0; lattice.nodes()], vec![0; lattice.nodes()]);
     indices(set, &mut coder, &lattice, &palette, &mut gain, &mut shape, most_reached(data.len()))?;
     if !coder.is_the_encoders() {
@@ -79,9 +113,9 @@ pub fn decode(data: &[u8], set: InstructionSet) -> Result<CompactMaterial, Error
 /// what is no material of this format.
 pub fn measure(material: &CompactMaterial, set: InstructionSet) -> Result<(f64, f64), Error> {
     material.check()?;
-    let mut coder = BitCounter(0.0);
-    let lattice = lattice(&mut coder, Some(&material.lattice))?;
-    let palette = palette(&mut coder, Some(&material.palette))?;
+    let (mut coder, layout) = (BitCounter(0.0), Layout::of(&material.lattice));
+    let lattice = lattice(&mut coder, layout, Some(&material.lattice))?;
+    let palette = palette(&mut coder, layout, Some(&material.palette))?;
     let head = coder.0;
     let (mut gain, mut shape) = (material.gain.clone(), material.shape.clone());
     indices(set, &mut coder, &lattice, &palette, &mut gain, &mut shape, usize::MAX)?;
@@ -150,11 +184,13 @@ fn bounded(
 }
 
 /// Writes the lattice that is known, or reads one if none is.
-fn lattice(coder: &mut impl Coder, known: Option<&NodeLattice>) -> Result<NodeLattice, Error> {
+fn lattice(coder: &mut impl Coder, layout: Layout, known: Option<&NodeLattice>) -> Result<NodeLattice, Error> {
     let (mut counts, mut steps) = (FRESH, [FRESH; 3]);
+    let (reciprocal, mirrored) = layout.folds();
+    let end = if mirrored { End::Folded } else { End::Open };
     let bands = 1 + coder.number(known.map_or(0, |l| l.theta_d.len() as u32 - 1), &mut counts);
     let bands = bounded(coder, bands, 1..=MOST_BANDS as i64, Error::Bands)? as usize;
-    let theta_h = axis(coder, known.map(|l| &l.theta_h[..]), true, &mut counts, &mut steps[0])?;
+    let theta_h = axis(coder, known.map(|l| &l.theta_h[..]), End::Closed, &mut counts, &mut steps[0])?;
     let mut band = Vec::new();
     for b in 0..bands {
         let left = theta_h.len() as i64 - band.len() as i64;
@@ -169,37 +205,50 @@ fn lattice(coder: &mut impl Coder, known: Option<&NodeLattice>) -> Result<NodeLa
     }
     let (mut theta_d, mut phi_d) = (Vec::new(), Vec::new());
     for b in 0..bands {
-        theta_d.push(axis(coder, known.map(|l| &l.theta_d[b][..]), true, &mut counts, &mut steps[1])?);
-        phi_d.push(axis(coder, known.map(|l| &l.phi_d[b][..]), false, &mut counts, &mut steps[2])?);
+        theta_d.push(axis(coder, known.map(|l| &l.theta_d[b][..]), End::Closed, &mut counts, &mut steps[1])?);
+        phi_d.push(axis(coder, known.map(|l| &l.phi_d[b][..]), end, &mut counts, &mut steps[2])?);
     }
-    let lattice = NodeLattice { theta_h, band, theta_d, phi_d };
+    let lattice = NodeLattice { theta_h, band, theta_d, phi_d, reciprocal, mirrored };
     bounded(coder, lattice.nodes() as i64, 1..=MOST_NODES as i64, Error::Nodes)?;
     Ok(lattice)
 }
 
-/// An axis that starts at 0: a closed one ends at FINE, which takes no bits; an open one ends before.
+/// Where an axis, which starts at 0, ends.
+#[derive(Clone, Copy, PartialEq)]
+enum End {
+    /// At FINE, which takes no bits.
+    Closed,
+    /// Before FINE.
+    Open,
+    /// At FINE, unless it is 0 alone.
+    Folded,
+}
+
+/// An axis.
 fn axis(
     coder: &mut impl Coder,
     known: Option<&[u8]>,
-    closed: bool,
+    end: End,
     counts: &mut Context,
     steps: &mut Context,
 ) -> Result<Vec<u8>, Error> {
-    let inner = coder.number(known.map_or(0, |axis| (axis.len() - 1 - usize::from(closed)) as u32), counts);
+    let counted = known.map_or(0, |axis| axis.len() - 1 - usize::from(end == End::Closed));
+    let counted = coder.number(counted as u32, counts);
+    let inner = if end == End::Folded { counted.saturating_sub(1) } else { counted };
     let mut places = vec![0];
     for i in 0..inner as usize {
         let before = u32::from(places[i]);
         let place = before + 1 + coder.number(known.map_or(0, |axis| u32::from(axis[i + 1]) - before - 1), steps);
         places.push(bounded(coder, place, 1..i64::from(FINE), Error::Axis)? as u8);
     }
-    if closed {
+    if end == End::Closed || inner < counted {
         places.push(FINE);
     }
     Ok(places)
 }
 
 /// Writes the palette that is known, or reads one if none is.
-fn palette(coder: &mut impl Coder, known: Option<&Palette>) -> Result<Palette, Error> {
+fn palette(coder: &mut impl Coder, layout: Layout, known: Option<&Palette>) -> Result<Palette, Error> {
     let (mut counts, mut steps) = (FRESH, [FRESH; 3]);
     let sizes = known.map_or([0, 0], |p| [p.gains.len() as u32 - 1, p.shapes.len() as u32 - 1]);
     let entries = 1..=MOST_ENTRIES as i64;
@@ -207,11 +256,17 @@ fn palette(coder: &mut impl Coder, known: Option<&Palette>) -> Result<Palette, E
     let count = bounded(coder, count, entries.clone(), Error::Gains)? as usize;
     let shape_count = 1 + coder.number(sizes[1], &mut counts);
     let shape_count = bounded(coder, shape_count, entries, Error::Shapes)? as usize;
-    let mut gains: Vec<u32> = Vec::with_capacity(count);
+    let mut gains: Vec<i32> = Vec::with_capacity(count);
+    let lowest = if layout == Layout::First { 0 } else { -HIGHEST_GAIN };
     for i in 0..count {
-        let least = gains.last().map_or(0, |code| code + 1);
-        let code = least + coder.number(known.map_or(0, |p| p.gains[i] - least), &mut steps[0]);
-        bounded(coder, code, 0..i64::from(HIGHEST_GAIN), Error::GainCode)?;
+        let code = if i == 0 && layout != Layout::First {
+            coder.signed(known.map_or(0, |p| p.gains[0]), &mut steps[0])
+        } else {
+            let least = gains.last().map_or(0, |code| code + 1);
+            least + coder.number(known.map_or(0, |p| (p.gains[i] - least) as u32), &mut steps[0]) as i32
+        };
+        let least = i64::from(lowest);
+        bounded(coder, code, least..=i64::from(HIGHEST_GAIN), |found| Error::GainCode { least, found })?;
         gains.push(code);
     }
     let widest = i64::from(WIDEST_SHAPE);

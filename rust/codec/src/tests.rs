@@ -1,10 +1,17 @@
 //! Streams that no encoder writes, and materials that are none: one test for each `Error`. Each check is also run on something that
 //! it has to refuse.
 
+mod golden;
+
 use crate::range_coder::{BitCounter, Coder, Context, Decoder, Encoder, FRESH};
-use crate::{CompactMaterial, Error, InstructionSet, NodeLattice, Palette, decode, encode, measure};
+use crate::{CompactMaterial, Error, InstructionSet, Layout, NodeLattice, Palette, decode, encode, measure};
 
 const SET: InstructionSet = InstructionSet::PORTABLE;
+const RECIPROCAL: Layout = Layout::Second { reciprocal: true, mirrored: false };
+const MIRRORED: Layout = Layout::Second { reciprocal: false, mirrored: true };
+
+/// Codes of gains and shapes, each with the number of its context.
+type Codes<'a> = &'a [(u32, usize)];
 
 /// The numbers at the start of a stream, as they are coded.
 struct Numbers<'a> {
@@ -15,12 +22,20 @@ struct Numbers<'a> {
     axes: &'a [&'a [u32]],
     gains: u32,
     shapes: u32,
-    /// Codes of gains and shapes, each with the number of its context.
-    codes: &'a [(u32, usize)],
+    codes: Codes<'a>,
+    layout: Layout,
 }
 
-const SHORT: Numbers =
-    Numbers { bands: 1, theta_h: &[0], rows: &[], axes: &[&[0], &[0]], gains: 1, shapes: 1, codes: &GOOD };
+const SHORT: Numbers = Numbers {
+    bands: 1,
+    theta_h: &[0],
+    rows: &[],
+    axes: &[&[0], &[0]],
+    gains: 1,
+    shapes: 1,
+    codes: &GOOD,
+    layout: Layout::First,
+};
 const GOOD: [(u32, usize); 3] = [(4095, 0), (0, 1), (0, 2)];
 
 impl Numbers<'_> {
@@ -52,7 +67,7 @@ impl Numbers<'_> {
     }
 
     fn error(&self) -> Option<Error> {
-        decode(&self.written(), SET).err()
+        decode(&self.written(), self.layout, SET).err()
     }
 }
 
@@ -68,8 +83,10 @@ fn small() -> CompactMaterial {
             band: vec![0, 1, 1],
             theta_d: vec![vec![0, 180], vec![0, 90, 180]],
             phi_d: vec![vec![0, 90], vec![0]],
+            reciprocal: true,
+            mirrored: false,
         },
-        palette: Palette { gains: vec![1, 2, 4095], shapes: vec![[-1024, 3], [0, 0], [0, -1024]] },
+        palette: Palette { gains: vec![-1, 2, 4095], shapes: vec![[-1024, 3], [0, 0], [0, -1024]] },
         gain: vec![0, 1, 2, 0, 1, 2, 0, 1, 2, 0],
         shape: vec![2, 1, 0, 2, 1, 0, 2, 1, 0, 2],
     }
@@ -79,7 +96,7 @@ fn small() -> CompactMaterial {
 fn numbers_beyond_their_bounds_are_refused() {
     let too_many: Vec<u32> = full(180);
     let wide = full(64);
-    let cases: [(Numbers, Error, &str); 16] = [
+    let cases: [(Numbers, Error, &str); 14] = [
         (Numbers { bands: 17, ..SHORT }, Error::Bands(17), "bands: expected 1 to 16, found 17"),
         (Numbers { bands: (1 << 21) - 1, ..SHORT }, Error::Bands(2097151), "bands: expected 1 to 16, found 2097151"),
         (Numbers { theta_h: &[1, 179], ..SHORT }, Error::Axis(180), "axis: expected 1 to 179, found 180"),
@@ -104,12 +121,6 @@ fn numbers_beyond_their_bounds_are_refused() {
         ),
         (Numbers { gains: 1025, ..SHORT }, Error::Gains(1025), "gains: expected 1 to 1024, found 1025"),
         (Numbers { shapes: 1025, ..SHORT }, Error::Shapes(1025), "shapes: expected 1 to 1024, found 1025"),
-        (Numbers { codes: &[(4096, 0)], ..SHORT }, Error::GainCode(4096), "gain: expected 0 to 4095, found 4096"),
-        (
-            Numbers { gains: 2, codes: &[(4095, 0), (0, 0)], ..SHORT },
-            Error::GainCode(4096),
-            "gain: expected 0 to 4095, found 4096",
-        ),
         (
             Numbers { codes: &[(4095, 0), (2049, 1)], ..SHORT },
             Error::ShapeCode(1025),
@@ -122,13 +133,45 @@ fn numbers_beyond_their_bounds_are_refused() {
         ),
     ];
     for (numbers, error, sentence) in cases {
-        assert_eq!(numbers.error(), Some(error));
+        for layout in [Layout::First, RECIPROCAL] {
+            assert_eq!(Numbers { layout, ..numbers }.error(), Some(error));
+        }
         assert_eq!(error.to_string(), sentence);
     }
     assert!(!matches!(
         SHORT.error(),
-        Some(Error::Bands(_) | Error::Axis(_) | Error::GainCode(_) | Error::ShapeCode(_))
+        Some(Error::Bands(_) | Error::Axis(_) | Error::GainCode { .. } | Error::ShapeCode(_))
     ));
+}
+
+#[test]
+fn gains_beyond_their_bounds_are_refused() {
+    // The first one is a number in format 1, and has a sign in format 2.
+    let cases: [(Layout, Codes, i64, &str); 6] = [
+        (Layout::First, &[(4096, 0)], 4096, "gain: expected 0 to 4095, found 4096"),
+        (Layout::First, &[(4095, 0), (0, 0)], 4096, "gain: expected 0 to 4095, found 4096"),
+        (RECIPROCAL, &[(8192, 0)], 4096, "gain: expected -4095 to 4095, found 4096"),
+        (RECIPROCAL, &[(8191, 0)], -4096, "gain: expected -4095 to 4095, found -4096"),
+        (MIRRORED, &[(8190, 0), (0, 0)], 4096, "gain: expected -4095 to 4095, found 4096"),
+        (MIRRORED, &[(8189, 0), (8191, 0)], 4097, "gain: expected -4095 to 4095, found 4097"),
+    ];
+    for (layout, codes, found, sentence) in cases {
+        let least = if layout == Layout::First { 0 } else { -4095 };
+        let error = Error::GainCode { least, found };
+        assert_eq!(Numbers { gains: codes.len() as u32, codes, layout, ..SHORT }.error(), Some(error));
+        assert_eq!(error.to_string(), sentence);
+    }
+}
+
+#[test]
+fn places_beyond_the_end_of_a_folded_axis_are_refused() {
+    let error = |phi_d| Numbers { axes: &[&[0], phi_d], layout: MIRRORED, ..SHORT }.error();
+    for phi_d in [&[2, 179][..], &[182, 178, 0], &[(1 << 21) - 2, 179]] {
+        assert_eq!(error(phi_d), Some(Error::Axis(180)));
+    }
+    for phi_d in [&[0][..], &[1], &[2, 178]] {
+        assert!(matches!(error(phi_d), None | Some(Error::OtherStream)));
+    }
 }
 
 #[test]
@@ -136,6 +179,10 @@ fn numbers_at_their_bounds_are_not_refused() {
     let shapes = [(4095, 0), (2048, 1), (2048, 2)];
     for numbers in [SHORT, Numbers { theta_h: &[1, 178], ..SHORT }, Numbers { codes: &shapes, ..SHORT }] {
         assert!(matches!(numbers.error(), None | Some(Error::OtherStream)), "{:?}", numbers.error());
+    }
+    for code in [8189, 8190] {
+        let error = Numbers { codes: &[(code, 0), (0, 1), (0, 2)], layout: RECIPROCAL, ..SHORT }.error();
+        assert!(matches!(error, None | Some(Error::OtherStream)), "{error:?}");
     }
 }
 
@@ -147,14 +194,16 @@ fn a_few_bytes_keep_no_decoder_busy() {
         Numbers { theta_h: &rows, axes: &[&planes, &turns], gains: 1024, shapes: 1024, codes: &codes, ..SHORT };
     let most = (1 << 22) + (1 << 11) * numbers.written().len();
     assert!(numbers.written().len() < 200);
-    assert_eq!(numbers.error(), Some(Error::Reached(most)));
+    for layout in [Layout::First, RECIPROCAL] {
+        assert_eq!(Numbers { layout, ..numbers }.error(), Some(Error::Reached(most)));
+    }
     let sentence = format!("entries within reach: expected at most {most}, found more");
     assert_eq!(Error::Reached(most).to_string(), sentence);
 }
 
 #[test]
 fn a_code_beyond_all_symbols_is_refused() {
-    let found = (0..=255).filter_map(|byte| decode(&[0xff, 0xff, 0xff, byte], SET).err());
+    let found = (0..=255).filter_map(|byte| decode(&[0xff, 0xff, 0xff, byte], RECIPROCAL, SET).err());
     assert!(found.clone().any(|error| error == Error::NoSymbol), "{:?}", found.collect::<Vec<_>>());
     let sentence = "stream: expected symbols of the range coder, found a code beyond all of them";
     assert_eq!(Error::NoSymbol.to_string(), sentence);
@@ -163,9 +212,9 @@ fn a_code_beyond_all_symbols_is_refused() {
 #[test]
 fn what_follows_the_end_is_refused() {
     let stream = encode(&small(), SET).unwrap();
-    assert_eq!(decode(&stream, SET).as_ref(), Ok(&small()));
+    assert_eq!(decode(&stream, RECIPROCAL, SET).as_ref(), Ok(&small()));
     for after in [&b"\0"[..], b"\x01", &[0; 9]] {
-        assert_eq!(decode(&[&stream, after].concat(), SET), Err(Error::OtherStream));
+        assert_eq!(decode(&[&stream, after].concat(), RECIPROCAL, SET), Err(Error::OtherStream));
     }
     assert_eq!(Error::OtherStream.to_string(), "expected a stream of nodes that ends with the file, found another");
 }
@@ -181,7 +230,7 @@ fn refusal(change: impl Fn(&mut CompactMaterial)) -> Option<Error> {
 
 #[test]
 fn lattices_that_are_none_are_not_written() {
-    let changes: [fn(&mut NodeLattice); 12] = [
+    let changes: [fn(&mut NodeLattice); 13] = [
         |l| l.theta_h.clear(),
         |l| l.theta_h = vec![0, 30, 179],
         |l| l.theta_h = vec![1, 30, 180],
@@ -194,11 +243,20 @@ fn lattices_that_are_none_are_not_written() {
         |l| l.theta_d[0] = vec![0],
         |l| l.phi_d[0] = vec![0, 180],
         |l| l.phi_d.truncate(1),
+        |l| l.mirrored = true,
     ];
     for change in changes {
         assert_eq!(refusal(|material| change(&mut material.lattice)), Some(Error::Lattice));
     }
     assert_eq!(refusal(|_| ()), None);
+    assert_eq!(refusal(|material| material.lattice.reciprocal = false), None);
+    for (phi_d, error) in [(vec![0, 180], None), (vec![0], Some(Error::Indices)), (vec![0, 60], Some(Error::Lattice))] {
+        let folded = refusal(|material| {
+            material.lattice.mirrored = true;
+            material.lattice.phi_d[0].clone_from(&phi_d);
+        });
+        assert_eq!(folded, error);
+    }
     assert_eq!(
         Error::Lattice.to_string(),
         "lattice: expected nodes that increase on each axis, and bands in order, found others"
@@ -213,6 +271,8 @@ fn more_nodes_and_bands_than_a_file_holds_are_not_written() {
         band: vec![0; rows],
         theta_d: vec![axis[..63].iter().copied().chain([180]).collect()],
         phi_d: vec![axis[..64].to_vec()],
+        reciprocal: true,
+        mirrored: false,
     };
     assert_eq!(most(32).check(), Ok(()));
     assert_eq!(most(33).check(), Err(Error::Lattice));
@@ -221,6 +281,8 @@ fn more_nodes_and_bands_than_a_file_holds_are_not_written() {
         band: (0..count as u8).collect(),
         theta_d: vec![vec![0, 180]; count],
         phi_d: vec![vec![0]; count],
+        reciprocal: false,
+        mirrored: true,
     };
     assert_eq!(bands(16).check(), Ok(()));
     assert_eq!(bands(17).check(), Err(Error::Lattice));
@@ -234,10 +296,11 @@ fn palettes_that_are_none_are_not_written() {
     }
     assert_eq!(Palette { gains: (0..1024).collect(), shapes: vec![[0, 0]; 1024] }.check(), Ok(()));
     assert_eq!(Error::PaletteSize.to_string(), "palette: expected 1 to 1024 gains and shapes");
-    let changes: [fn(&mut Palette); 6] = [
+    let changes: [fn(&mut Palette); 7] = [
         |p| p.gains = vec![4, 4, 5],
         |p| p.gains = vec![5, 4, 6],
         |p| p.gains = vec![1, 2, 4096],
+        |p| p.gains = vec![-4096, 2, 3],
         |p| p.shapes[1] = [-1025, 0],
         |p| p.shapes[2] = [0, i32::MIN],
         |p| p.shapes[0] = [1, 0],

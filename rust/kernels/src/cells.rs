@@ -150,7 +150,7 @@ fn positions_for<const TRILINEAR: bool>(pairs: &Pairs, lattice: CellLattice, at:
     let [bins_h, bins_d, bins_p] = lattice.bins.map(|n| n as f64);
     let range = if lattice.reciprocal { std::f64::consts::PI } else { std::f64::consts::TAU };
     for i in 0..BATCH {
-        let [theta_h, theta_d, phi_d] = pairs.half_diff(i, lattice.reciprocal);
+        let [theta_h, theta_d, phi_d] = pairs.half_diff(i, lattice.reciprocal, false);
         let u = bins_h * (theta_h * (1.0 / half_pi)).sqrt();
         let (v, w) = (theta_d * (bins_d / half_pi), phi_d * (bins_p / range));
         let w = if w > 0.0 { w } else { 0.0 }; // where lengths overflow, it is no number

@@ -85,7 +85,7 @@ impl Pairs {
 
     /// θ_h, θ_d and φ_d of a pair, as `half_diff` gives them.
     #[inline(always)]
-    pub fn half_diff(&self, i: usize, reciprocal: bool) -> [f64; 3] {
+    pub fn half_diff(&self, i: usize, reciprocal: bool, mirrored: bool) -> [f64; 3] {
         let pairs = &self.0;
         let (sx, sy, sz) = (pairs[0][i] + pairs[3][i], pairs[1][i] + pairs[4][i], pairs[2][i] + pairs[5][i]);
         let (vx, vy, vz) = (pairs[0][i] - pairs[3][i], pairs[1][i] - pairs[4][i], pairs[2][i] - pairs[5][i]);
@@ -95,6 +95,9 @@ impl Pairs {
         let theta_d = atan2(v, s);
         let x = 0.0 - vz * s;
         let y = (vy * sx - vx * sy) + 0.0;
+        if mirrored {
+            return [theta_h, theta_d, atan2(y.abs(), if reciprocal { x.abs() } else { x })];
+        }
         let other = (y < 0.0) | ((y == 0.0) & (x < 0.0));
         let (up, across) = if other { (-y, -x + 0.0) } else { (y, x + 0.0) };
         let folded = atan2(up, across);

@@ -47,6 +47,8 @@ pub struct NodeSteps {
     /// For each step in θ_h the bands of the rows below and after.
     band: [[u8; 2]; 256],
     nodes: usize,
+    reciprocal: bool,
+    mirrored: bool,
 }
 
 impl NodeSteps {
@@ -55,22 +57,22 @@ impl NodeSteps {
         if !lattice.is_valid() {
             return None;
         }
-        let NodeLattice { theta_h, band, theta_d, phi_d } = lattice;
+        let &NodeLattice { ref theta_h, ref band, ref theta_d, ref phi_d, reciprocal, mirrored } = lattice;
         let mut base = vec![0];
         for &b in band {
             base.push(base[base.len() - 1] + (theta_d[b as usize].len() * phi_d[b as usize].len()) as u32);
         }
         let bands = theta_d.iter().zip(phi_d).map(|(theta_d, phi_d)| {
             let count = phi_d.len() as u32;
-            let turn: Vec<u8> = phi_d.iter().copied().chain([FINE as u8]).collect();
-            Band {
-                theta_d: steps(theta_d, |node| node as u32 * count),
-                phi_d: steps(&turn, |node| node as u32 % count),
-            }
+            let theta_d = steps(theta_d, |node| node as u32 * count);
+            let ends = phi_d[phi_d.len() - 1] == FINE as u8;
+            // Else the first node comes again there; also where it is the only one of an axis that does not turn.
+            let whole: Vec<u8> = phi_d.iter().copied().chain((!ends).then_some(FINE as u8)).collect();
+            Band { theta_d, phi_d: steps(&whole, |node| node as u32 % count) }
         });
         let band = below(theta_h).map(|row| [band[row], band[row + 1]]);
         let rows = steps(theta_h, |row| base[row]);
-        Some(NodeSteps { rows, bands: bands.collect(), band, nodes: lattice.nodes() })
+        Some(NodeSteps { rows, bands: bands.collect(), band, nodes: lattice.nodes(), reciprocal, mirrored })
     }
 
     /// The number of nodes.
@@ -164,16 +166,39 @@ pub struct NodeMaterial<'a> {
     steps: &'a NodeSteps,
     factors: Factors<'a>,
     scale: f64,
+    /// Blended values up to this one count as 0.
+    least: f64,
     /// The values of all nodes. Empty for few pairs, whose lookup takes less time than to calculate these.
     values: Vec<[f64; 4]>,
 }
 
 impl<'a> NodeMaterial<'a> {
-    /// scale: of the cube-root domain. pairs: how many it will be evaluated for.
-    pub fn new(steps: &'a NodeSteps, factors: Factors<'a>, scale: f64, pairs: usize) -> Self {
+    /// scale: of the cube-root domain. signed: whether blended values below 0 count, and not as 0. pairs: how many it will be
+    /// evaluated for.
+    pub fn new(steps: &'a NodeSteps, factors: Factors<'a>, scale: f64, signed: bool, pairs: usize) -> Self {
         let count = if pairs > steps.nodes / 6 { steps.nodes } else { 0 };
         let values = (0..count).map(|node| factors.value(node)).collect();
-        NodeMaterial { steps, factors, scale, values }
+        let least = if signed { f64::NEG_INFINITY } else { 0.0 };
+        NodeMaterial { steps, factors, scale, least, values }
+    }
+
+    /// Places of a batch on the fine grid, the steps that they lie in, and what cubes are multiplied with.
+    #[inline(always)]
+    fn places<const RECIPROCAL: bool, const MIRRORED: bool>(
+        &self,
+        pairs: &Pairs,
+        at: &mut Room,
+        steps: &mut [[u8; BATCH]; 3],
+    ) {
+        for i in 0..BATCH {
+            let place = place::<RECIPROCAL, MIRRORED>(pairs.half_diff(i, RECIPROCAL, MIRRORED));
+            for c in 0..3 {
+                at[c][i] = place[c];
+                steps[c][i] = step(place[c]);
+            }
+            let [cos_i, cos_o] = pairs.cosines(i).map(|c| c.max(SMALLEST_COSINE));
+            at[3][i] = self.scale / (cos_i * cos_o);
+        }
     }
 
     #[inline(always)]
@@ -185,12 +210,13 @@ impl<'a> NodeMaterial<'a> {
         out: &mut [f64],
         value: impl Fn(usize) -> [f64; 4],
     ) {
+        let least = self.least;
         for i in 0..BATCH.min(out.len() / 3) {
             let f_r = match pairs.known(i) {
                 Some(known) => [known; 4],
                 None => {
                     let y = self.steps.blend([0, 1, 2].map(|c| at[c][i]), steps.map(|step| step[i]), &value);
-                    y.map(|y| if y > 0.0 { y * y * y * at[3][i] } else { 0.0 })
+                    y.map(|y| if y > least { y * y * y * at[3][i] } else { 0.0 })
                 }
             };
             match out.get_mut(3 * i..3 * i + 4) {
@@ -205,14 +231,11 @@ impl Material for NodeMaterial<'_> {
     #[inline(always)]
     fn batch(&self, pairs: &Pairs, at: &mut Room, out: &mut [[f64; 3]]) {
         let mut steps = [[0; BATCH]; 3];
-        for i in 0..BATCH {
-            let place = place(pairs.half_diff(i, true));
-            for c in 0..3 {
-                at[c][i] = place[c];
-                steps[c][i] = step(place[c]);
-            }
-            let [cos_i, cos_o] = pairs.cosines(i).map(|c| c.max(SMALLEST_COSINE));
-            at[3][i] = self.scale / (cos_i * cos_o);
+        match (self.steps.reciprocal, self.steps.mirrored) {
+            (false, false) => self.places::<false, false>(pairs, at, &mut steps),
+            (false, true) => self.places::<false, true>(pairs, at, &mut steps),
+            (true, false) => self.places::<true, false>(pairs, at, &mut steps),
+            (true, true) => self.places::<true, true>(pairs, at, &mut steps),
         }
         let out = out.as_flattened_mut();
         if self.values.is_empty() {
@@ -235,10 +258,11 @@ fn step(place: f64) -> u8 {
 
 /// The place on the fine grid of half/difference angles.
 #[inline(always)]
-fn place([theta_h, theta_d, phi_d]: [f64; 3]) -> [f64; 3] {
-    use std::f64::consts::{FRAC_PI_2, PI};
+fn place<const RECIPROCAL: bool, const MIRRORED: bool>([theta_h, theta_d, phi_d]: [f64; 3]) -> [f64; 3] {
+    use std::f64::consts::{FRAC_PI_2, TAU};
+    let range = TAU / if RECIPROCAL { 2.0 } else { 1.0 } / if MIRRORED { 2.0 } else { 1.0 };
     let a = (theta_h * (1.0 / FRAC_PI_2)).sqrt();
     let x = if a < KNEE / BELOW { a * BELOW } else { KNEE + (a - KNEE / BELOW) * ABOVE };
-    let z = phi_d * (FINE as f64 / PI);
-    [x, theta_d * (FINE as f64 / FRAC_PI_2), if z >= FINE as f64 { z - FINE as f64 } else { z }]
+    let z = phi_d * (FINE as f64 / range);
+    [x, theta_d * (FINE as f64 / FRAC_PI_2), if !MIRRORED && z >= FINE as f64 { z - FINE as f64 } else { z }]
 }

@@ -144,27 +144,42 @@ fn lookup_in_cells_reads_nothing_outside() {
 
 #[test]
 fn lookup_on_nodes() {
+    for reciprocal in [false, true] {
+        for signed in [false, true] {
+            looks_up_on_nodes(vec![0, 50, 90, 140], reciprocal, false, signed);
+            looks_up_on_nodes(vec![0, 50, 90, 180], reciprocal, true, signed);
+        }
+    }
+}
+
+/// phi_d: of one of two bands.
+fn looks_up_on_nodes(phi_d: Vec<u8>, reciprocal: bool, mirrored: bool, signed: bool) {
     let lattice = NodeLattice {
         theta_h: vec![0, 3, 40, 90, 180],
         band: vec![1, 0, 0, 1, 1],
         theta_d: vec![vec![0, 60, 180], vec![0, 180]],
-        phi_d: vec![vec![0, 50, 90, 140], vec![0]],
+        phi_d: vec![phi_d, vec![0]],
+        reciprocal,
+        mirrored,
     };
     let steps = NodeSteps::new(&lattice).unwrap();
     assert_eq!(steps.nodes(), 2 + 12 + 12 + 2 + 2);
     let mut next = numbers(7);
-    let gains: Vec<f64> = (0..9).map(|_| next()).collect();
+    let gains: Vec<f64> = (0..9).map(|_| next() - 0.4).collect();
     let shapes: Vec<[f64; 3]> = (0..8).map(|_| [0; 3].map(|_| next() - 0.1)).collect();
     let (gain, shape): (Vec<u16>, Vec<u16>) = (0..30).map(|_| ((next() * 9.0) as u16, (next() * 8.0) as u16)).unzip();
     let factors = Factors { gains: &gains, shapes: &shapes, gain: &gain, shape: &shape };
     assert!(factors.fit(30) && !factors.fit(29));
-    let made = |factors, pairs| NodeMaterial::new(&steps, factors, 0.3, pairs);
+    let made = |factors, pairs| NodeMaterial::new(&steps, factors, 0.3, signed, pairs);
     let expected = looked_up(&made(factors, 1000), InstructionSet::PORTABLE, 1);
+    let below = |bits: &u64| f64::from_bits(*bits) < 0.0;
+    assert_eq!(expected.as_flattened().iter().any(below), signed);
     for pairs in [0, 1000] {
         assert!(same_everywhere(&made(factors, pairs), &expected));
         let outside = Factors { gain: &gain[..9], shapes: &shapes[..3], ..factors };
         assert!(!same_everywhere(&made(outside, pairs), &expected));
     }
+    assert!(NodeSteps::new(&NodeLattice { mirrored: !mirrored, ..lattice.clone() }).is_none());
     assert!(NodeSteps::new(&NodeLattice { band: vec![0; 4], ..lattice }).is_none());
 }
 

@@ -83,7 +83,7 @@ class Quantised:
 
     def palette(self, lattice: NodeLattice) -> Any:
         """The core's object for these palettes on a lattice, which measures and writes streams."""
-        return _core.NodePalette(*lattice.axes(), self.gains.tolist(), self.shapes.tolist())
+        return _core.NodePalette(*lattice.axes(), self.gains.tolist(), self.shapes.tolist(), **lattice.folds)
 
     def ordered(self) -> Quantised:
         """The same, without unused and repeated entries, and sorted in the order in which a file stores them."""

@@ -11,22 +11,23 @@ Floats = NDArray[np.float64]
 Codes = NDArray[np.int64]
 
 OCTAVE = 128  # codes for each doubling of gain + ½; within a doubling, gains are equally spaced
-LARGEST_GAIN = 2**12 - 1  # the largest code of a gain
+LARGEST_GAIN = 2**12 - 1  # the largest code of a gain; the smallest is its negative
 UNIT = 64  # codes for a step of 1 in a coordinate of a shape
 LARGEST_SHAPE = 2**10  # the largest code of a coordinate; the smallest is its negative
 
 
 def gain_values(codes: NDArray[Any]) -> Floats:
-    """The gains that codes stand for: 0, 1/256, … up to nearly 2³¹."""
-    octave, step = np.divmod(np.asarray(codes, np.int64), OCTAVE)
-    return 0.5 * ((1 << octave) * (1.0 + step / OCTAVE) - 1.0)
+    """The gains that codes stand for: 0, 1/256, … up to nearly 2³¹; negative ones for negative codes."""
+    sign, size = np.sign(codes), np.abs(np.asarray(codes, np.int64))
+    octave, step = np.divmod(size, OCTAVE)
+    return sign * (0.5 * ((1 << octave) * (1.0 + step / OCTAVE) - 1.0))
 
 
 def gain_codes(gains: NDArray[Any]) -> Codes:
-    """The codes nearest to gains, which must not be negative."""
-    mantissa, exponent = np.frexp(2.0 * np.asarray(gains, np.float64) + 1.0)
+    """The codes nearest to gains; negative ones for negative gains."""
+    mantissa, exponent = np.frexp(2.0 * np.abs(np.asarray(gains, np.float64)) + 1.0)
     codes = np.rint((exponent - 1 + (2.0 * mantissa - 1.0)) * OCTAVE)
-    return np.clip(codes, 0, LARGEST_GAIN).astype(np.int64)
+    return np.copysign(np.minimum(codes, LARGEST_GAIN), gains).astype(np.int64)
 
 
 def shape_values(codes: NDArray[Any]) -> Floats:

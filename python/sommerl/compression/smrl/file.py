@@ -1,15 +1,15 @@
-"""Writes and reads material files (.smrl), format 1. docs/format.md specifies every byte.
+"""Writes and reads material files (.smrl), formats 1 and 2. docs/format.md specifies every byte.
 
     bytes  what
     4      "SMRL"
-    2      version, 1
+    2      version: 1 for cells; 2 for nodes, of which 1 is read, too
     4      CRC-32 of all that follows
     1      kind: 0 for cells (the preset `paper`), 1 for nodes (`compact`)
     1, …   length of the name, and the name in UTF-8
     1, …   32 and the SHA-256 of the source, or 0
     2, …   length of the notes, and the notes: JSON in UTF-8, with options and metrics; or 0
     …      cells: lattice, lookup, number of LUT entries, and a deflate stream of LUT and index
-           nodes: scale, and a stream of lattice, palette and indices
+           nodes: scale, flags (not in version 1), and a stream of lattice, palette and indices
 
 All numbers are little-endian.
 """
@@ -39,11 +39,12 @@ from . import notes
 from .codes import coordinates, gain_codes, gain_values, shape_codes, shape_values
 
 MAGIC = b"SMRL"
-VERSION = 1
 SHORT = struct.Struct("<H")
 CELLS, NODES = 0, 1
+VERSIONS = {CELLS: 1, NODES: 2}  # that are written; the last one is the newest
 CELLS_HEAD = struct.Struct("<HHHBBI")
-NODES_HEAD = struct.Struct("<f")
+SCALE = struct.Struct("<f")
+RECIPROCAL, MIRRORED, SIGNED = 1, 2, 4  # flags of nodes
 MOST_BINS = 2**16 - 1  # on an axis: stored in two bytes
 MOST_CELLS = 2**22  # enough for MERL's larger kind of table, which has 2,916,000
 # The largest index and the largest LUT, not compressed, and room for the rest.
@@ -91,7 +92,7 @@ def encode(material: SomManBrdf) -> bytes:
     noted = _noted(material)
     kind, contents = (NODES, _nodes(material)) if material.grid is None else (CELLS, _cells(material, material.grid))
     body = _head(kind, material.name, material.source.sha256, noted) + contents
-    return sealed_file.sealed(MAGIC, VERSION, body)
+    return sealed_file.sealed(MAGIC, VERSIONS[kind], body)
 
 
 def _noted(material: SomManBrdf) -> bytes:
@@ -102,7 +103,7 @@ def _noted(material: SomManBrdf) -> bytes:
 def head_bytes(name: str, source: Source) -> int:
     """The length of a compact material's file before its stream [bytes]."""
     head = _head(NODES, name, source.sha256, notes.written(made_from=list(source.made_from)))
-    return sealed_file.PREFIX.size + len(head) + NODES_HEAD.size
+    return sealed_file.PREFIX.size + len(head) + SCALE.size + BYTE.size
 
 
 def _head(kind: int, name: str, source_sha256: str, noted: bytes) -> bytes:
@@ -113,22 +114,23 @@ def _head(kind: int, name: str, source_sha256: str, noted: bytes) -> bytes:
 
 def decode(data: bytes) -> SomManBrdf:
     """Reads a material from the bytes of a file. Raises FormatError if they are not a valid file."""
-    reader = sealed_file.opened(data, MAGIC, VERSION, "material file (.smrl)")
+    version, reader = sealed_file.opened(data, MAGIC, VERSIONS[NODES], "material file (.smrl)")
     try:
-        return _material(reader)
+        return _material(version, reader)
     except FormatError:
         raise
     except (KeyError, TypeError, ValueError, OverflowError, SommerlError) as error:
         raise FormatError(f"expected a material file's header and contents, found others ({error})") from error
 
 
-def _material(reader: Reader) -> SomManBrdf:
+def _material(version: int, reader: Reader) -> SomManBrdf:
     (kind,) = reader.unpack(BYTE)
-    if kind not in (CELLS, NODES):
-        raise FormatError(f"expected kind 0 or 1, found {kind}")
+    kinds = [known for known, newest in VERSIONS.items() if version <= newest]
+    if kind not in kinds:
+        raise FormatError(f"expected kind {' or '.join(map(str, kinds))}, found {kind}")
     known: dict[str, Any] = reader.origin()
     known |= notes.parsed(reader.take(*reader.unpack(SHORT)))
-    return _from_nodes(reader, known) if kind == NODES else _from_cells(reader, known)
+    return _from_nodes(version, reader, known) if kind == NODES else _from_cells(reader, known)
 
 
 def _cells(material: SomManBrdf, lattice: Lattice) -> bytes:
@@ -173,21 +175,27 @@ def _nodes(material: SomManBrdf) -> bytes:
     if not (np.array_equal(gain_values(gains), entries.gains) and np.array_equal(shape_values(shapes), entries.lut)):
         raise FormatError(f"{material.name}: expected a palette whose values have codes, found others")
     try:
-        palette = _core.NodePalette(*lattice.axes(), gains.tolist(), shapes.tolist())
-        return NODES_HEAD.pack(entries.scale) + palette.encode(*material.index)
+        palette = _core.NodePalette(*lattice.axes(), gains.tolist(), shapes.tolist(), **lattice.folds)
+        flags = RECIPROCAL * lattice.reciprocal | MIRRORED * lattice.mirrored | SIGNED * entries.signed
+        return SCALE.pack(entries.scale) + BYTE.pack(flags) + palette.encode(*material.index)
     except (ValueError, OverflowError) as error:
         raise FormatError(f"{material.name}: {error}") from error
 
 
-def _from_nodes(reader: Reader, known: dict[str, Any]) -> SomManBrdf:
-    (scale,) = reader.unpack(NODES_HEAD)
+def _from_nodes(version: int, reader: Reader, known: dict[str, Any]) -> SomManBrdf:
+    (scale,) = reader.unpack(SCALE)
     if not 0 < scale < np.inf:
         raise FormatError("expected a positive scale that is finite, found another")
+    (flags,) = reader.unpack(BYTE) if version > 1 else (RECIPROCAL,)
+    if flags > RECIPROCAL | MIRRORED | SIGNED:
+        raise FormatError(f"expected flags from 0 to 7, found {flags}")
+    folds = bool(flags & RECIPROCAL), bool(flags & MIRRORED)
     try:
-        palette, (gain, shape) = _core.NodePalette.decode(reader.rest())
+        palette, (gain, shape) = _core.NodePalette.decode(reader.rest(), *folds, version)
     except ValueError as error:
         raise FormatError(str(error)) from error
-    axes = (tuple(map(tuple, axis)) for axis in (palette.theta_d, palette.phi_d))
-    lattice = NodeLattice(tuple(palette.theta_h), tuple(palette.band), *axes)
+    theta_d, phi_d = (tuple(map(tuple, axes)) for axes in (palette.theta_d, palette.phi_d))
+    lattice = NodeLattice(tuple(palette.theta_h), tuple(palette.band), theta_d, phi_d, *folds)
     shapes, gains = shape_values(np.array(palette.shapes)), gain_values(np.array(palette.gains))
-    return SomManBrdf(GainsAndShapes(gains, shapes, scale), np.stack([gain, shape]), lattice, **known)
+    entries = GainsAndShapes(gains, shapes, scale, bool(flags & SIGNED))
+    return SomManBrdf(entries, np.stack([gain, shape]), lattice, **known)

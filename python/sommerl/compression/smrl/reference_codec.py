@@ -17,7 +17,7 @@ RATE = 4  # a probability moves by 2^-RATE of the way towards the bit that came
 LONGEST, CONTEXT = 20, 24  # bits of a number after its first one; probabilities in a context
 FINE = 180  # steps of the fine grid on each axis
 MOST_BANDS, MOST_NODES, MOST_ENTRIES = 16, 2**17, 2**10
-HIGHEST_GAIN, WIDEST_SHAPE = 2**12, 2**10
+HIGHEST_GAIN, WIDEST_SHAPE = 2**12 - 1, 2**10
 MOST_REACHED, REACHED_BY_ANY, REACHED_A_BYTE = 2**26, 2**22, 2**11
 
 Axis = list[int]
@@ -27,16 +27,17 @@ Lattice = tuple[Axis, list[int], list[Axis], list[Axis]]
 
 
 def decode(
-    data: bytes,
+    data: bytes, mirrored: bool = False, version: int = 2
 ) -> tuple[Axis, list[int], list[Axis], list[Axis], list[int], list[Shape], list[int], list[int]]:
     """Decodes a whole stream: theta_h, band, theta_d, phi_d, gain_codes, shape_codes, gain_index, shape_index.
 
-    The first four are as in `NodeLattice`, the indices are by node. Raises FormatError for a stream that is not valid.
+    The first four are as in `NodeLattice`, the indices are by node. mirrored: of the lattice. version: 1 or 2. Raises
+    FormatError for a stream that is not valid.
     """
     coder = Decoder(data)
-    theta_h, band, theta_d, phi_d = lattice = _lattice(coder)
-    gains, shapes = _palette(coder)
-    model = Model(lattice, gains, shapes)
+    theta_h, band, theta_d, phi_d = lattice = _lattice(coder, mirrored)
+    gains, shapes = _palette(coder, version)
+    model = Model(lattice, mirrored, gains, shapes)
     most = min(MOST_REACHED, REACHED_BY_ANY + REACHED_A_BYTE * len(data))
     gain_index: list[int] = []
     shape_index: list[int] = []
@@ -122,10 +123,10 @@ def _contexts() -> list[Context]:
     return [[EVEN] * CONTEXT for _ in range(4)]
 
 
-def _lattice(coder: Decoder) -> Lattice:
+def _lattice(coder: Decoder, mirrored: bool) -> Lattice:
     counts, *steps = _contexts()
     bands = _bounded("bands", 1 + coder.number(counts), 1, MOST_BANDS)
-    theta_h = _axis(coder, counts, steps[0], closed=True)
+    theta_h = _closed(coder, counts, steps[0])
     band: list[int] = []
     for b in range(bands):
         left = len(theta_h) - len(band)
@@ -134,28 +135,44 @@ def _lattice(coder: Decoder) -> Lattice:
     theta_d: list[Axis] = []
     phi_d: list[Axis] = []
     for _ in range(bands):
-        theta_d.append(_axis(coder, counts, steps[1], closed=True))
-        phi_d.append(_axis(coder, counts, steps[2], closed=False))
+        theta_d.append(_closed(coder, counts, steps[1]))
+        phi_d.append((_folded if mirrored else _open)(coder, counts, steps[2]))
     _bounded("nodes", sum(len(theta_d[b]) * len(phi_d[b]) for b in band), 1, MOST_NODES)
     return theta_h, band, theta_d, phi_d
 
 
-def _axis(coder: Decoder, counts: Context, steps: Context, *, closed: bool) -> Axis:
+def _closed(coder: Decoder, counts: Context, steps: Context) -> Axis:
+    return [*_open(coder, counts, steps), FINE]
+
+
+def _open(coder: Decoder, counts: Context, steps: Context) -> Axis:
+    return _places(coder, coder.number(counts), steps)
+
+
+def _folded(coder: Decoder, counts: Context, steps: Context) -> Axis:
+    count = coder.number(counts)
+    return [*_places(coder, count - 1, steps), FINE] if count else [0]
+
+
+def _places(coder: Decoder, inner: int, steps: Context) -> Axis:
     places = [0]
-    for _ in range(coder.number(counts)):
+    for _ in range(inner):
         places.append(_bounded("axis", places[-1] + 1 + coder.number(steps), 1, FINE - 1))
-    return places + [FINE] * closed
+    return places
 
 
-def _palette(coder: Decoder) -> tuple[list[int], list[Shape]]:
+def _palette(coder: Decoder, version: int) -> tuple[list[int], list[Shape]]:
     counts, *steps = _contexts()
     gains = _bounded("gains", 1 + coder.number(counts), 1, MOST_ENTRIES)
     shapes = _bounded("shapes", 1 + coder.number(counts), 1, MOST_ENTRIES)
     gain_codes: list[int] = []
-    code = -1
-    for _ in range(gains):
-        code = _bounded("gain", code + 1 + coder.number(steps[0]), 0, HIGHEST_GAIN - 1)
-        gain_codes.append(code)
+    lowest = 0 if version == 1 else -HIGHEST_GAIN
+    for i in range(gains):
+        if i:
+            code = gain_codes[-1] + 1 + coder.number(steps[0])
+        else:
+            code = coder.number(steps[0]) if version == 1 else coder.signed(steps[0])
+        gain_codes.append(_bounded("gain", code, lowest, HIGHEST_GAIN))
     shape_codes: list[Shape] = []
     first, second = -WIDEST_SHAPE, 0
     for _ in range(shapes):

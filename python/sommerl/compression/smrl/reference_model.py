@@ -23,15 +23,20 @@ Way = tuple[int, int, float]  # two neighbouring nodes on an axis, and the share
 
 
 class Model:
-    """Predicts one node after the other, in the order of the stream. lattice: theta_h, band, theta_d, phi_d."""
+    """Predicts one node after the other, in the order of the stream.
+
+    lattice: theta_h, band, theta_d, phi_d. mirrored: whether φ_d has ends, and does not turn.
+    """
 
     def __init__(
         self,
         lattice: tuple[list[int], list[int], list[list[int]], list[list[int]]],
+        mirrored: bool,
         gains: list[int],
         shapes: list[tuple[int, int]],
     ) -> None:
         _, self._band, self._theta_d, self._phi_d = lattice
+        self._mirrored = mirrored
         places = [[code / OCTAVE for code in gains], *([shape[axis] / UNIT for shape in shapes] for axis in (0, 1))]
         self._places = places
         self._predictors = [Predictor(values) for values in places]
@@ -52,11 +57,11 @@ class Model:
 
     def _moved(self, plane: Plane, old: int, new: int) -> Plane:
         """A row of one band, interpolated to the nodes of another band."""
-        width, moved = len(self._phi_d[old]), _plane(0)
+        width, moved, about = len(self._phi_d[old]), _plane(0), _between if self._mirrored else _around
         for y in self._theta_d[new]:
             d0, d1, v = _between(self._theta_d[old], y)
             for x in self._phi_d[new]:
-                p0, p1, u = _around(self._phi_d[old], x)
+                p0, p1, u = about(self._phi_d[old], x)
                 for grid, to in zip(plane, moved, strict=True):
                     for a, out in zip(grid, to, strict=True):
                         low = a[d0 * width + p0] * (1.0 - u) + a[d0 * width + p1] * u
@@ -83,7 +88,7 @@ class Model:
         width, under = self._width, self._row > 0
         now, above, higher = (plane[0][c] for plane in (self._present, self._above, self._higher))
         line, at = d * width, d * width + p
-        west, east = line + (p - 1) % width, line + (p + 1) % width
+        west, east = (line + q for q in self._beside(p))
         if under:
             up = above[at]
         elif p > 0 and d > 0:
@@ -107,6 +112,13 @@ class Model:
             higher[at] if self._row > 1 else up,
             up + news,
         ]
+
+    def _beside(self, p: int) -> tuple[int, int]:
+        """The nodes on either side of node p in φ_d."""
+        last = self._width - 1
+        if self._mirrored:
+            return p - 1 if p > 0 else min(1, last), p + 1 if p < last else max(last - 1, 0)
+        return (p - 1) % self._width, (p + 1) % self._width
 
     def gain_weights(self) -> list[int]:
         """The weights of all gains for the present node."""

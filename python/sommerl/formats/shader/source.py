@@ -19,9 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compression.material import SomManBrdf
+from ...compression.palette import GainsAndShapes
 from ...reflectance.brdf import Brdf
 from ...reflectance.cells import Lattice
-from ...reflectance.nodes import ABOVE, BELOW, FINE, HALF_PI, KNEE, SMALLEST_COSINE
+from ...reflectance.half_diff import phi_d_range
+from ...reflectance.nodes import ABOVE, BELOW, FINE, HALF_PI, KNEE, SMALLEST_COSINE, NodeLattice
 from ...sampling import half_vector
 from ...system.errors import FormatError
 from ...system.files import atomic_write
@@ -94,7 +96,7 @@ def source(material: Brdf, language: Language, name: str) -> str:
         raise FormatError(f"{material.name}: expected a compressed material, with a palette, found a {material.kind}")
     buffers, lut = material.buffers(), material.lut
     if material.grid is None:
-        parts = _nodes(buffers, lut)
+        parts = _nodes(material, buffers)
     else:
         parts = _cells(material.grid, material.interpolation, buffers["index"], lut)
     table = half_vector.HalfVectorSampler.fitted(material).table
@@ -148,15 +150,23 @@ def _cells(lattice: Lattice, interpolation: str, index: NDArray[Any], lut: NDArr
         contents=_template("contents_cells"),
         arrays=[words, _reals("SOMMERL_LUT", "palette", lut)],
         functions=_template("cells"),
-        fold=_template("fold_reciprocal" if lattice.reciprocal else "fold_not_reciprocal"),
+        fold=_fold(lattice.reciprocal),
         lookup=_template(f"lookup_{interpolation}", BINS=_template("bins")),
         values=values,
     )
 
 
-def _nodes(buffers: Mapping[str, NDArray[Any]], lut: NDArray[np.float64]) -> _Parts:
+def _fold(reciprocal: bool, mirrored: bool = False) -> str:
+    """How φ_d is folded."""
+    return _template(f"fold{'_mirrored' if mirrored else ''}{'' if reciprocal else '_not'}_reciprocal")
+
+
+def _nodes(material: SomManBrdf, buffers: Mapping[str, NDArray[Any]]) -> _Parts:
     """Of a lattice of nodes: the two entries of each, that of the LUT in the lower bits. buffers: the material's."""
-    gains = buffers["gains"]
+    palette, places = material.palette, material.lattice
+    assert isinstance(palette, GainsAndShapes)
+    assert isinstance(places, NodeLattice)
+    gains, lut = palette.gains, palette.lut
     shape_bits = max(1, (len(lut) - 1).bit_length())
     bits = shape_bits + max(1, (len(gains) - 1).bit_length())
     entries = buffers["index"].astype(np.uint32) | buffers["gain_index"].astype(np.uint32) << np.uint32(shape_bits)
@@ -172,7 +182,7 @@ def _nodes(buffers: Mapping[str, NDArray[Any]], lut: NDArray[np.float64]) -> _Pa
         "BELOW": str(BELOW),
         "ABOVE": str(ABOVE),
         "STEPS_THETA": repr(FINE / HALF_PI),
-        "STEPS_PHI": repr(FINE / (2 * HALF_PI)),
+        "STEPS_PHI": repr(FINE / phi_d_range(**places.folds)),
         "SMALLEST_COSINE": repr(SMALLEST_COSINE),
         "SCALE": _numbers(buffers["scale"])[0],
     }
@@ -180,9 +190,9 @@ def _nodes(buffers: Mapping[str, NDArray[Any]], lut: NDArray[np.float64]) -> _Pa
     return _Parts(
         contents=_template("contents_nodes"),
         arrays=[words, *reals, _words("SOMMERL_LATTICE", "lattice", lattice)],
-        functions=_template("nodes"),
-        fold=_template("fold_reciprocal"),
-        lookup=_template("lookup_nodes"),
+        functions=_template("nodes", CUBE=_template("cube_signed" if palette.signed else "cube_not_signed")),
+        fold=_fold(**places.folds),
+        lookup=_template("lookup_nodes", TURN="" if places.mirrored else _template("turn")),
         values=values,
     )
 

@@ -6,11 +6,14 @@ const FINE = 180;
 // Entries within reach, added up over all nodes: what the time grows with.
 const [MOST_REACHED, REACHED_BY_ANY, REACHED_A_BYTE] = [2 ** 26, 2 ** 22, 2 ** 11];
 
-/** {lattice: {thetaH, band, thetaD, phiD}, gainCodes, shapeCodes, gainIndex, index}. Throws an Error. */
-export function readNodes(bytes) {
+/**
+ * {lattice: {thetaH, band, thetaD, phiD, mirrored}, gainCodes, shapeCodes, gainIndex, index}. Throws an Error.
+ * mirrored: of the lattice. version: of the stream, 1 or 2.
+ */
+export function readNodes(bytes, mirrored, version) {
     const coder = new Decoder(bytes);
-    const lattice = readLattice(coder);
-    const [gainCodes, shapeCodes] = readPalette(coder);
+    const lattice = readLattice(coder, mirrored);
+    const [gainCodes, shapeCodes] = readPalette(coder, version);
     const { band, thetaD, phiD } = lattice;
     const places = [gainCodes.map((c) => c / 128), ...[0, 1].map((axis) => shapeCodes.map((c) => c[axis] / 64))];
     const gains = new Entries(places[0], places[0].map(() => 0));
@@ -113,10 +116,11 @@ function bounded(what, value, least, most) {
 
 const context = () => new Array(24).fill(2048);
 
-function readLattice(coder) {
+function readLattice(coder, mirrored) {
     const [counts, h, d, p] = [context(), context(), context(), context()];
     const bands = bounded("bands", 1 + coder.number(counts), 1, 16);
-    const thetaH = readAxis(coder, counts, h, [FINE]);
+    const closed = (steps) => [...readPlaces(coder, coder.number(counts), steps), FINE];
+    const thetaH = closed(h);
     const band = [];
     for (let b = 0; b < bands; b++) {
         const left = thetaH.length - band.length;
@@ -125,28 +129,32 @@ function readLattice(coder) {
     }
     const [thetaD, phiD] = [[], []];
     for (let b = 0; b < bands; b++) {
-        thetaD.push(readAxis(coder, counts, d, [FINE]));
-        phiD.push(readAxis(coder, counts, p, []));
+        thetaD.push(closed(d));
+        const count = coder.number(counts);
+        const ends = mirrored && count > 0;
+        phiD.push([...readPlaces(coder, ends ? count - 1 : count, p), ...(ends ? [FINE] : [])]);
     }
     bounded("nodes", band.reduce((sum, b) => sum + thetaD[b].length * phiD[b].length, 0), 1, 2 ** 17);
-    return { thetaH, band, thetaD, phiD };
+    return { thetaH, band, thetaD, phiD, mirrored };
 }
 
-function readAxis(coder, counts, steps, end) {
+function readPlaces(coder, inner, steps) {
     const places = [0];
-    for (let i = coder.number(counts); i > 0; i--) {
+    for (let i = inner; i > 0; i--) {
         places.push(bounded("axis", places.at(-1) + 1 + coder.number(steps), 1, FINE - 1));
     }
-    return [...places, ...end];
+    return places;
 }
 
-function readPalette(coder) {
+function readPalette(coder, version) {
     const [counts, s, u, v] = [context(), context(), context(), context()];
     const gains = bounded("gains", 1 + coder.number(counts), 1, 1024);
     const shapes = bounded("shapes", 1 + coder.number(counts), 1, 1024);
     const [gainCodes, shapeCodes] = [[], []];
+    const [first, lowest] = version === 1 ? [() => coder.number(s), 0] : [() => coder.signed(s), -4095];
     for (let i = 0; i < gains; i++) {
-        gainCodes.push(bounded("gain", (gainCodes.at(-1) ?? -1) + 1 + coder.number(s), 0, 4095));
+        const code = i > 0 ? gainCodes[i - 1] + 1 + coder.number(s) : first();
+        gainCodes.push(bounded("gain", code, lowest, 4095));
     }
     for (let i = 0, [first, second] = [-1024, 0]; i < shapes; i++) {
         first = bounded("shape", first + coder.number(u), -1024, 1024);
@@ -179,10 +187,11 @@ class Model {
     }
 
     moved(plane, from, to) {
-        const { thetaD, phiD } = this.lattice;
+        const { thetaD, phiD, mirrored } = this.lattice;
         const width = phiD[from].length;
+        const way = mirrored ? (axis, x) => between(axis, axis.length, x) : around;
         const ways = thetaD[to].flatMap((y) =>
-            phiD[to].map((x) => [...between(thetaD[from], thetaD[from].length, y), ...around(phiD[from], x)]),
+            phiD[to].map((x) => [...between(thetaD[from], thetaD[from].length, y), ...way(phiD[from], x)]),
         );
         const blend = (a) => ([d0, d1, v, p0, p1, u]) => {
             const low = a[d0 * width + p0] * (1 - u) + a[d0 * width + p1] * u;
@@ -214,7 +223,7 @@ class Model {
         const { width } = this;
         const [now, above, higher] = [this.present[0][c], this.above?.[0][c], this.higher?.[0][c]];
         const [line, at, under] = [d * width, d * width + p, this.row > 0];
-        const [west, east] = [line + ((p + width - 1) % width), line + ((p + 1) % width)];
+        const [west, east] = beside(p, width, this.lattice.mirrored).map((q) => line + q);
         let up = p > 0 ? now[at - 1] : d > 0 ? now[at - width] : 0;
         if (p > 0 && d > 0) up = 0.5 * (now[at - 1] + now[at - width]);
         if (under) up = above[at];
@@ -342,6 +351,13 @@ class Entries {
         this.narrow = 0.96 * (near / (near + far)) + 0.02;
         this.roots[i] = Math.sqrt(++this.counts[i]);
     }
+}
+
+/** The nodes next to node p in φ_d, which turns, or turns back at its ends. */
+function beside(p, width, mirrored) {
+    const last = width - 1;
+    if (!mirrored) return [(p + last) % width, (p + 1) % width];
+    return [p > 0 ? p - 1 : Math.min(1, last), p < last ? p + 1 : Math.max(last - 1, 0)];
 }
 
 /** Of the first `length` nodes of an axis, those on either side of a place, and the way to the second. */

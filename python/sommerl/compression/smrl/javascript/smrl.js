@@ -1,9 +1,10 @@
 /**
- * Material files (.smrl), format 1, for browsers and Node: docs/format.md has every byte.
+ * Material files (.smrl), formats 1 and 2, for browsers and Node: docs/format.md has every byte.
  *
  * decode(arrayBuffer) gives kind ("cells" or "nodes"), name, sha256, notes, interpolation, scale, lattice, lut and index;
- * of nodes also gains and gainIndex. lut and gains are Float64Arrays, lut in triples. Indices are one for each cell, 0
- * below the horizon, or one for each node. It throws an Error that says what was expected.
+ * of nodes also signed, gains and gainIndex. lattice has reciprocal, of nodes also mirrored. lut and gains are
+ * Float64Arrays, lut in triples. Indices are one for each cell, 0 below the horizon, or one for each node. It throws an
+ * Error that says what was expected.
  */
 import { readNodes } from "./nodes.js";
 
@@ -23,28 +24,36 @@ export async function decode(arrayBuffer) {
     expect(bytes.length >= 10, `at least 10 bytes, found ${bytes.length}`);
     expect(String.fromCharCode(...reader.take(4)) === "SMRL", "a material file (.smrl), found another kind");
     const version = reader.number(2);
-    const hint = version > 1 ? "a newer Sommerl may read it" : "make it from its source again";
-    expect(version === 1, `version 1, found version ${version}; ${hint}`);
+    const hint = version > 2 ? "a newer Sommerl may read it" : "make it from its source again";
+    expect(version === 1 || version === 2, `version 1 or 2, found version ${version}; ${hint}`);
     const whole = reader.number(4) === crc32(bytes.subarray(10));
     expect(whole, "the checksum in the file, found another: the file is damaged or cut off");
     const kind = reader.number(1);
-    expect(kind < 2, `kind 0 or 1, found ${kind}`);
+    expect(kind === 1 || (kind === 0 && version === 1), `kind ${version > 1 ? "1" : "0 or 1"}, found ${kind}`);
     const name = reader.text(reader.number(1));
     expect(name !== null, "a name in UTF-8, found other bytes");
     const digest = reader.number(1);
     expect(digest === 0 || digest === 32, `a digest of 0 or 32 bytes, found ${digest}`);
     const sha256 = Array.from(reader.take(digest), (byte) => byte.toString(16).padStart(2, "0")).join("");
     const notes = readNotes(reader.text(reader.number(2)));
-    return { name, sha256, notes, ...(kind ? nodes(reader) : await cells(reader)) };
+    return { name, sha256, notes, ...(kind ? nodes(reader, version) : await cells(reader)) };
 }
 
-function nodes(reader) {
+function nodes(reader, version) {
     const scale = new DataView(reader.take(4).slice().buffer).getFloat32(0, true);
     expect(scale > 0 && scale < Infinity, "a positive scale that is finite, found another");
-    const { lattice, gainCodes, shapeCodes, gainIndex, index } = readNodes(reader.rest());
-    const gains = Float64Array.from(gainCodes, (code) => 0.5 * (2 ** (code >> 7) * (1 + (code & 127) / 128) - 1));
+    const flags = version > 1 ? reader.number(1) : 1;
+    expect(flags < 8, `flags from 0 to 7, found ${flags}`);
+    const [reciprocal, mirrored, signed] = [1, 2, 4].map((bit) => (flags & bit) > 0);
+    const { lattice, gainCodes, shapeCodes, gainIndex, index } = readNodes(reader.rest(), mirrored, version);
+    const gains = Float64Array.from(gainCodes, (code) => Math.sign(code) * gain(Math.abs(code)));
     const lut = Float64Array.from(shapeCodes.flatMap(shape));
-    return { kind: "nodes", interpolation: "trilinear", scale, lattice, gains, lut, gainIndex, index };
+    const known = { kind: "nodes", interpolation: "trilinear", scale, signed, lattice: { ...lattice, reciprocal } };
+    return { ...known, gains, lut, gainIndex, index };
+}
+
+function gain(code) {
+    return 0.5 * (2 ** (code >> 7) * (1 + (code & 127) / 128) - 1);
 }
 
 function shape([first, second]) {
