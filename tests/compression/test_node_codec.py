@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from sommerl import _core
 from sommerl.compression.smrl import reference_codec
-from sommerl.compression.smrl.codes import coordinates, gain_codes, shape_codes
+from sommerl.compression.smrl.codes import coordinates, gain_codes, gain_values, shape_codes
 from sommerl.compression.smrl.file import encode
 from sommerl.system.errors import FormatError
 
@@ -330,6 +330,18 @@ def test_palettes_that_cannot_be_written(change):
     fine[change[0]] = change[1]
     with pytest.raises(ValueError, match=r"^(lattice|palette): expected "):
         _core.NodePalette(*fine)
+
+
+def check_opposites(values):
+    codes = np.arange(-4095, 4096)
+    assert np.array_equal(values(-codes), -values(codes))
+    assert np.array_equal(gain_codes(values(codes)), codes)
+
+
+def test_negative_codes_stand_for_negative_gains():
+    check_opposites(gain_values)
+    must_fail(check_opposites, lambda codes: gain_values(np.abs(codes)))
+    assert gain_codes(np.array([-1e12, -1.5, -0.0, 0.0, 1e12])).tolist() == [-4095, -256, 0, 0, 4095]
 
 
 def test_entries_that_are_none():
