@@ -1,11 +1,11 @@
 """What the option `distinct` changes: how many cells a unit remembers, the table's error, and PSNR on the sphere.
 
-    uv run python benchmarks/distinct.py ../shared/data/nbrdf/merl.npz
+    uv run python benchmarks/distinct.py FOLDER
 
-The argument is a folder of tables, or an archive, with the paper's six materials. Each is compressed by both rules at
-the settings of docs/method.md, without and with `distinct`; the reference is the table with nearest lookup. Prints
-Markdown: the share of units that store one colour three times, the relative L2 error and the cosine-weighted error of
-the logarithm over the table's cells, and the PSNR over the object [dB].
+FOLDER holds MERL tables of the paper's six materials; or it is an archive of neural BRDFs with them. Each is compressed
+by both rules at the settings of docs/method.md, without and with `distinct`; the reference is the table with nearest
+lookup. Prints Markdown: the share of units that store one colour three times, the relative L2 error and the
+cosine-weighted error of the logarithm over the table's cells, and the PSNR over the object [dB].
 """
 
 from __future__ import annotations
@@ -72,10 +72,10 @@ def main() -> None:
                 found.append(train(table, options, kernels=watched)[0])
                 error = table_metrics(table.values, found[-1].values, table.lattice)
                 share = of_one_colour(table, watched.learner.stored_cells())
-                figures.append((share, error.relative_error, error.log_error_cosine))
+                figures.append((share, error["relative_error"], error["log_error_cosine"]))
             compared = compare_on_sphere(table, found, default_environment(), spp=given.spp)
             shares, relative, logs = zip(*figures, strict=True)
-            psnr = [each.metrics.psnr_object_db for each in compared]
+            psnr = [each.metrics["psnr_object_db"] for each in compared]
             print(
                 f"| {name}, {clusters}, {epochs} | {rule}, {alpha} | {shares[0]:.0%}, {shares[1]:.0%} | "
                 f"{relative[0]:.5f}, {relative[1]:.5f} | {logs[0]:.5f}, {logs[1]:.5f} | "

@@ -12,6 +12,7 @@ from typing import Any
 
 from ..fitting.options import FitOptions
 from ..reproduction import tables
+from ..reproduction.data import described
 from ..system.errors import FormatError
 from ..system.files import atomic_write, check_writable
 from . import console
@@ -29,12 +30,13 @@ TITLES = {
 }
 DRAWN = ("fig5", "fig6")  # items with a picture beside their table
 
-HEADINGS = {
+HEADINGS = {  # in short lines, so that a table of errors fits 80 columns
     "model": "model",
     "error": "table",
-    "error_som_man": "M = 1000",
-    "paper": "paper: table",
-    "paper_som_man": "paper: ours",
+    "error_som_man": "M = 1000,\ndefault",
+    "error_printed": "M = 1000,\nEq. 2 as\nprinted",
+    "paper": "paper:\ntable",
+    "paper_som_man": "paper:\nours",
     "psnr_frame_db": "PSNR, frame",
     "psnr_object_db": "PSNR, object",
     "paper_db": "paper",
@@ -74,7 +76,8 @@ def paper(options: PaperArguments) -> dict[str, Any]:
     with named_as_typed():
         chosen = FitOptions(samples=options.samples, seed=options.seed)
     make_folder(options.out)
-    result: dict[str, Any] = {"input": str(options.data) if options.data else None, "output": []}
+    of_what = described(options.data)
+    result: dict[str, Any] = {"input": str(options.data) if options.data else None, "data": of_what, "output": []}
     files = {
         item: [options.out / f"{item}.{extension}" for extension in ("csv", "png")[: 2 if item in DRAWN else 1]]
         for item in (TITLES if options.item == "all" else [options.item])
@@ -89,7 +92,7 @@ def paper(options: PaperArguments) -> dict[str, Any]:
         result[item] = rows
         result["output"] += map(str, written)
         if not options.json:
-            _show(title, rows)
+            _show(f"{title}, of {of_what}", rows)
             console.say("→ " + ", ".join(map(str, written)), "")
     return result
 
@@ -114,7 +117,7 @@ def _show(title: str, rows: Sequence[dict[str, Any]]) -> None:
                 found = [value for key, value in row.items() if key != "material"]
                 shown.append([f"{value:.5g}" if isinstance(value, float) else str(value) for value in found])
         columns = [HEADINGS[key] for key in rows[0] if key != "material"]
-        console.print_table(f"{title}, {material}" if material else title, columns, shown)
+        console.print_table(f"{title}: {material}" if material else title, columns, shown)
 
 
 def _write(path: Path, rows: Sequence[dict[str, Any]]) -> None:

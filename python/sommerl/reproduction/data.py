@@ -5,15 +5,26 @@ from __future__ import annotations
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 from ..compression.material import SomManBrdf
-from ..compression.paper.options import TrainOptions
+from ..compression.paper.options import Rule, TrainOptions
 from ..compression.paper.train import train
 from ..formats.load import load_table
 from ..formats.registry import extensions, readable
 from ..reflectance.table import BrdfTable
 from ..system.errors import FormatError
+
+
+class Learnt(TypedDict, total=False):
+    """The options of `train` by which the two ways of learning differ."""
+
+    rule: Rule
+    alpha: float
+
+
+#: By what they are called. The paper prints no rate for its equation; docs/method.md has the experiment.
+RULES: dict[str, Learnt] = {"default": {}, "Eq. 2 as printed": {"rule": "paper", "alpha": 0.5}}
 
 
 def expected(item: str) -> dict[str, Any]:
@@ -41,6 +52,13 @@ def material(data: Path | None, name: str) -> BrdfTable:
     return load_table(source)
 
 
-def compressed(table: BrdfTable, clusters: int, epochs: int = 30) -> SomManBrdf:
-    """The table, compressed with the preset `paper` and nearest lookup."""
-    return train(table, TrainOptions(clusters=clusters, epochs=epochs))[0]
+def described(data: Path | None) -> str:
+    """What the materials in `data` are, as captions say it."""
+    if data is None:
+        return "built-in SGD stand-ins"
+    return f"NBRDF stand-ins of {data.name}" if data.is_file() else f"the files in {data.absolute().name}"
+
+
+def compressed(table: BrdfTable, clusters: int, epochs: int = 30, **rule: Unpack[Learnt]) -> SomManBrdf:
+    """The table, compressed with the preset `paper` and nearest lookup. rule: one of RULES."""
+    return train(table, TrainOptions(clusters=clusters, epochs=epochs, **rule))[0]
