@@ -114,7 +114,7 @@ def written_by_all(folder):
         figure = page.matplotlib().Figure()
         lobes(figure.add_subplot(projection="polar"), builtin("nickel"))
         page.save(figure, folder / f"plot{extension}")
-    report._write(folder / "table1.csv", [vars(FitRow("nickel", "ward", 1, 1, 1, 1))])
+    report._write(folder / "table1.csv", [vars(FitRow("nickel", "ward", 1, 1, 1, 1, 1))])
     report._write(folder / "fig5.csv", [vars(ImageRow("ward", 1, 1, 1))])
     return sorted(folder.iterdir())
 

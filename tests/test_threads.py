@@ -31,7 +31,7 @@ def watch():
         for task, used in ticks().items():
             if task != str(threading.get_native_id()):
                 seen[task] = max(used, seen.get(task, 0))
-watcher = threading.Thread(target=watch)
+watcher = threading.Thread(target=watch, daemon=True)
 import sommerl
 {prepare}
 before = ticks()
@@ -57,7 +57,7 @@ WORK = {
         "from sommerl import _core; import numpy as np\n"
         "made = _core.NodePalette([*range(31), 180], [0] * 32, [[*range(63), 180]], [[*range(64)]], [1, 9], [[0, 0]])\n"
         "data = made.encode(*np.random.default_rng(0).integers(0, [[2], [1]], (2, 2**17)).astype(np.uint16))",
-        "[_core.NodePalette.decode(data) for _ in range(5)]",
+        "[_core.NodePalette.decode(data, True, False) for _ in range(5)]",
     ),
     "render": (
         "from sommerl import builtin; from sommerl.render import environment, images, passes, scenes\n"

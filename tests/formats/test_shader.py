@@ -18,11 +18,16 @@ def check_like_python(brdf, found):
     assert np.allclose(found, brdf.eval(A, B), rtol=1e-5, atol=1e-12)
 
 
+def in_header(tmp_path, brdf, real):
+    """f_r that the C++ header of a material gives for A and B. real: its type of numbers."""
+    shader.write(brdf, tmp_path / "x.h")
+    return run(tmp_path, real)
+
+
 @pytest.mark.parametrize(("lattice", "clusters", "interpolation"), CASES)
 def test_the_header_gives_what_python_gives(tmp_path, lattice, clusters, interpolation):
     brdf = material(lattice, clusters, interpolation)
-    shader.write(brdf, tmp_path / "x.h")
-    found = run(tmp_path, "double")
+    found = in_header(tmp_path, brdf, "double")
     check_like_python(brdf, found)
     if clusters > 1:
         must_fail(
@@ -33,8 +38,7 @@ def test_the_header_gives_what_python_gives(tmp_path, lattice, clusters, interpo
 @pytest.mark.parametrize("case", COMPACT)
 def test_compact_materials_are_the_same_in_the_header(tmp_path, case):
     brdf = compact(case)
-    shader.write(brdf, tmp_path / "x.h")
-    found = run(tmp_path, "double")
+    found = in_header(tmp_path, brdf, "double")
     check_like_python(brdf, found)
     broken = SomManBrdf(GainsAndShapes(1.001 * brdf.palette.gains, brdf.lut, 0.04), brdf.index, brdf.lattice, name="x")
     must_fail(check_like_python, broken, found)
@@ -78,8 +82,7 @@ def check_like_python_in_single_precision(brdf, found):
 @pytest.mark.parametrize("case", COMPACT)
 def test_compact_materials_in_single_precision(tmp_path, case):
     brdf = compact(case)
-    shader.write(brdf, tmp_path / "x.h")
-    found = run(tmp_path, "float")
+    found = in_header(tmp_path, brdf, "float")
     check_like_python_in_single_precision(brdf, found)
     must_fail(check_like_python_in_single_precision, brdf, found * 1.0002)
 
