@@ -236,7 +236,7 @@ def test_on_the_command_line(capsys, tmp_path):
     path = tmp_path / "x.smrl"
     assert main(["compress", "red-fabric", "-o", str(path), "--target-size", "800"]) == 0
     text = capsys.readouterr().out
-    assert "PSNR, object, on a sphere" in text
+    assert "PSNR in soft light" in text
     assert path.stat().st_size <= 800
 
 
@@ -248,7 +248,7 @@ def test_one_that_fails_does_not_hold_up_the_others(capsys, tmp_path, monkeypatc
 
     report = search.CompactReport(40.0, 1.0, [])
     monkeypatch.setattr("sommerl.compression.compact.search.compress", only_fabric)
-    monkeypatch.setattr("sommerl.render.compress.judge_on_sphere", lambda *_: None)
+    monkeypatch.setattr("sommerl.render.judge.Judge.metrics", lambda *_: {})
     assert main(["compress", "nickel", "red-fabric", "-o", str(tmp_path), "--preset", "compact"]) == 1
     error = capsys.readouterr().err
     assert "nickel (SGD stand-in): out of reach" in error
