@@ -76,19 +76,27 @@ def score(metrics: dict[str, float]) -> float:
 
 def seen(brdf: Brdf) -> Seen:
     """Looks at a BRDF."""
-    sampler = brdf.sampler
+    sampler, (_, normals) = brdf.sampler, _normals(SIDE)
     return Seen(
-        _lit(brdf, *_lamps()),
-        _lit(brdf, *_key_lamp()),
+        _lit(brdf, normals, *_lamps()),
+        _lit(brdf, normals, *_key_lamp()),
         brdf.eval(*(_cosine(PAIRS, seed) for seed in (0, 1))),
         brdf.eval(*(_grazing(GRAZING_PAIRS, seed) for seed in (2, 3))),
         sampler.albedo(ANGLES, points=POINTS),
     )
 
 
-def _lit(brdf: Brdf, lamps: Vectors, power: Values) -> Values:
-    """The radiance of a sphere's pixels (n, 3). lamps: directions (k, 3); power: radiance times solid angle (k, 3)."""
-    frame, viewer = _sphere()
+def under_one_lamp(brdf: Brdf, side: int) -> Values:
+    """The linear picture (side, side, 3) of the sphere under the one lamp; 0 around the sphere."""
+    inside, normals = _normals(side)
+    found = np.zeros((side * side, 3))
+    found[inside] = _lit(brdf, normals, *_key_lamp())
+    return found.reshape(side, side, 3)
+
+
+def _lit(brdf: Brdf, normals: Vectors, lamps: Vectors, power: Values) -> Values:
+    """The radiance of pixels with normals (n, 3). lamps: directions (k, 3); power: radiance times solid angle (k, 3)."""
+    frame, viewer = _frames(normals)
     total = np.zeros((len(viewer), 3))
     for start in range(0, len(lamps), AT_ONCE):
         part = slice(start, start + AT_ONCE)
@@ -98,13 +106,17 @@ def _lit(brdf: Brdf, lamps: Vectors, power: Values) -> Values:
     return total
 
 
-def _sphere() -> tuple[NDArray[np.float64], Vectors]:
-    """The surface frames (n, 3, 3) of a sphere's pixels, rows being tangent, bitangent and normal, and the viewer's
-    directions in them (n, 3). In the picture, x is to the right, y up, and z towards the viewer."""
-    at = (np.arange(SIDE) + 0.5) / SIDE * 2 - 1
+def _normals(side: int) -> tuple[NDArray[np.bool_], Vectors]:
+    """Which of side² pixels show the sphere, and their normals (n, 3): x to the right, y up, z towards the viewer."""
+    at = (np.arange(side) + 0.5) / side * 2 - 1
     x, y = (c.reshape(-1) for c in np.meshgrid(at, -at))
-    inside = x * x + y * y < 1 - 1 / SIDE
-    normal = np.stack([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 0.0))], axis=-1)[inside]
+    inside = x * x + y * y < 1 - 1 / side
+    return inside, np.stack([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 0.0))], axis=-1)[inside]
+
+
+def _frames(normal: Vectors) -> tuple[NDArray[np.float64], Vectors]:
+    """The surface frames (n, 3, 3) at normals (n, 3), rows being tangent, bitangent and normal, and the viewer's
+    directions in them (n, 3)."""
     tangent = np.cross([0.0, 1.0, 0.0], normal)
     tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
     frame: Values = np.stack([tangent, np.cross(normal, tangent), normal], axis=1).astype(np.float64)
