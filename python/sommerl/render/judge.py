@@ -95,8 +95,8 @@ def under_one_lamp(brdf: Brdf, side: int) -> Values:
 
 
 def _lit(brdf: Brdf, normals: Vectors, lamps: Vectors, power: Values) -> Values:
-    """The radiance of pixels (n, 3). normals: theirs (n, 3). lamps: directions (k, 3); power: radiance times solid angle
-    (k, 3)."""
+    """The radiance of pixels, (n, 3). normals: theirs, (n, 3). lamps: directions (k, 3). power: of the lamps, radiance
+    times solid angle (k, 3)."""
     frame, viewer = _frames(normals)
     total = np.zeros((len(viewer), 3))
     for start in range(0, len(lamps), AT_ONCE):
