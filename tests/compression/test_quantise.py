@@ -6,17 +6,25 @@ from helpers import compact_material, complaint, lambertian_table, must_fail, ra
 
 from sommerl import BrdfTable, Lattice, builtin, load, save
 from sommerl.commands.cli import main
-from sommerl.compression.compact import search
+from sommerl.compression.compact import lattice_fit, search
 from sommerl.compression.compact.lattice_fit import Fitter
 from sommerl.compression.compact.quantise import Quantised, quantise
 from sommerl.compression.compact.search import CompactOptions, compress
 from sommerl.compression.smrl import file
 from sommerl.compression.smrl.codes import coordinates, gain_codes, gain_values, shape_codes, shape_values
 from sommerl.reflectance.nodes import NodeLattice
+from sommerl.reflectance.reciprocal import reciprocal
 from sommerl.system.errors import MaterialError, OptionError
 
 A, B = (w[w[:, 2] > 0.1] for w in (random_directions(20_000, s) for s in (1, 2)))
 A, B = A[:15_000], B[:15_000]
+
+
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch):
+    """What tests fit themselves is fitted with fewer directions and lines than usual."""
+    monkeypatch.setattr(lattice_fit, "DIRECTIONS", 100_000)
+    monkeypatch.setattr(lattice_fit, "LINES", 100)
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +52,8 @@ def check_fits(problem, found, stream, target):
     assert len(data) <= target
     palette = quantised.palette(problem.lattice)
     assert palette.encode(quantised.gain_index, quantised.shape_index) == data
-    assert problem.excess(quantised.values()) < 2 * problem.error
+    # That of black is the sum of all squares: 44 dB in the cube-root domain.
+    assert problem.excess(quantised.values()) < 4e-5 * problem.excess(0 * problem.best)
 
 
 def test_a_stream_of_at_most_a_size(problem):
@@ -82,7 +91,8 @@ def test_without_refinement_entries_are_the_sources(problem):
 
 def test_k_means_is_no_other_way_to_the_end(problem):
     """Palettes are refined by turns: where they started matters little."""
-    errors = [problem.excess(quantise(problem, 60, 40, 700, start=start)[0].values()) for start in ("som", "k-means")]
+    found = [quantise(problem, 60, 40, 700, start=start)[0].values() for start in ("som", "k-means")]
+    errors = [problem.error + problem.excess(values) for values in found]
     assert max(errors) < 1.3 * min(errors)
 
 
@@ -130,11 +140,18 @@ def test_a_lambertian_comes_back():
     assert np.array_equal(material.eval(A, B), material.eval(B, A))
 
 
-def test_what_is_not_reciprocal_is_averaged():
+def test_what_is_not_reciprocal_stays_so_or_is_averaged():
     lattice = Lattice(20, 20, 40, reciprocal=False)
     values = np.full((*lattice.shape, 3), 0.1)
     values[:, :, 20:] = 0.3
-    material, _ = compress(BrdfTable(values, lattice), CompactOptions(target_size=600))
+    source = BrdfTable(values, lattice)
+    material, _ = compress(source, CompactOptions(target_size=600))
+    assert [material.reciprocal, material.mirrored] == [False, False]
+    check_close(material, source, 0.02)
+    must_fail(check_close, reciprocal(source), source, 0.02)
+    material, _ = compress(reciprocal(source), CompactOptions(target_size=600))
+    assert material.reciprocal
+    check_close(material, reciprocal(source), 0.02)
     assert np.median(material.eval(A, B)) == pytest.approx(0.2, rel=0.02)
 
 
@@ -248,7 +265,7 @@ def test_one_that_fails_does_not_hold_up_the_others(capsys, tmp_path, monkeypatc
 
     report = search.CompactReport(40.0, 1.0, [])
     monkeypatch.setattr("sommerl.compression.compact.search.compress", only_fabric)
-    monkeypatch.setattr("sommerl.render.judge.Judge.metrics", lambda *_: {})
+    monkeypatch.setattr("sommerl.render.judge.Judge.metrics", lambda *_: {"psnr_soft_db": 40.0})
     assert main(["compress", "nickel", "red-fabric", "-o", str(tmp_path), "--preset", "compact"]) == 1
     error = capsys.readouterr().err
     assert "nickel (SGD stand-in): out of reach" in error

@@ -37,10 +37,14 @@ def test_a_white_lambertian(tmp_path):
 
 
 def test_colours(tmp_path):
-    """A band of red light alone."""
+    """A band of red light alone, which is outside sRGB: green is below 0, and goes to 0 along the line to the grey of
+    its luminance."""
     spectrum = np.tile([0, 0, 0, 0, 0, 1.0, 1.0], (40, 1))
     table = load(written(tmp_path / "paint.txt", content(spectrum)))
-    expected = np.maximum(srgb_weights(np.array(WAVELENGTHS))[5:].sum(axis=0), 0)
+    outside = srgb_weights(np.array(WAVELENGTHS))[5:].sum(axis=0)
+    assert outside[1] == outside.min() < 0
+    grey = outside @ [0.2126, 0.7152, 0.0722]
+    expected = grey + (outside - grey) * grey / (grey - outside[1])
     assert np.allclose(table.eval(A, B), expected, rtol=1e-6)
     assert expected[0] > 5 * expected[1]
 
