@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from helpers import lambertian_table, must_fail, random_directions, run, run_json
+from helpers import lambertian_table, moved_share, must_fail, random_directions, run, run_json
 from rgl_files import content
 
 from sommerl import MERL, BrdfTable, Lattice, TrainOptions, builtin, load, save, train
@@ -110,8 +110,7 @@ COUNTED = [
     ["convert", "{}", "x.binary"],
     ["compress", "{}", "-o", "x.smrl", "--clusters", 2, "--epochs", 1],
 ]
-# (-0.1, 0.3, 0.3) is moved towards the grey of its luminance, 0.21496, until its red is 0.
-MOVED = (0.1 + 2 * (0.3 - 0.21496) * 0.1 / 0.31496) / 0.7
+MOVED = moved_share([-0.1, 0.3, 0.3])
 
 
 def check_told(result):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers import must_fail, random_directions
+from helpers import must_fail, nearest_held, random_directions
 from rgl_files import content
 
 from sommerl import builtin, load
@@ -98,7 +98,17 @@ def test_colours_without_negatives():
     assert (found[2] == 0).all()  # of negative luminance
     luminance = np.array([0.2126, 0.7152, 0.0722])
     assert np.allclose(found[[1, 4]] @ luminance, given[[1, 4]] @ luminance)
-    assert found[1, 0] == pytest.approx(0, abs=1e-15)
-    assert found[4, 2] == pytest.approx(0, abs=1e-15)
-    grey = given[1] @ luminance  # the same hue: in proportion to the distance from grey
-    assert np.allclose((found[1] - grey) / (given[1] - grey), grey / (grey + 0.1))
+    assert found[1, 0] == found[4, 2] == 0
+
+
+def check_nearest(move):
+    given = np.random.default_rng(0).normal(0.1, 0.3, (500, 3))
+    given = given[(given @ [0.2126, 0.7152, 0.0722] > 1e-3)]
+    assert (given.min(axis=-1) < 0).sum() > 100
+    assert ((given < 0).sum(axis=-1) == 2).any()
+    assert np.allclose(move(given), [nearest_held(colour) for colour in given], atol=1e-12)
+
+
+def test_the_change_is_the_least():
+    check_nearest(without_negatives)
+    must_fail(check_nearest, lambda rgb: np.maximum(rgb, 0))
