@@ -10,9 +10,11 @@ from helpers import random_directions
 from sommerl import BrdfTable, load
 from sommerl.formats import rgl, rgl_export
 from sommerl.reflectance.brdf import Brdf
+from sommerl.reflectance.gamut import without_negatives
 from sommerl.reflectance.reciprocal import reciprocal
 from sommerl.render.compare import compare_on_sphere
 from sommerl.render.environment import default_environment
+from sommerl.render.judge import Judge
 from sommerl.render.llvm import drjit, mitsuba
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
@@ -60,10 +62,21 @@ def psnr(reference, candidate):
     return compare_on_sphere(reference, [candidate], default_environment(), size=128)[0].metrics["psnr_object_db"]
 
 
+class Held(Brdf):
+    """What a table could hold of a material, if it had a cell for each pair of directions."""
+
+    def __init__(self, source):
+        self.name, self._source = "held", reciprocal(source)
+
+    def f_r(self, wi, wo, buffers):
+        f_r = np.stack(self._source.f_r(wi, wo, self._source.buffers()), axis=-1)
+        return tuple(np.moveaxis(without_negatives(f_r), -1, 0))
+
+
 def test_rgl_as_a_table():
-    found = [psnr(reciprocal(source), BrdfTable.sampled(source)) for source in map(load, RGL)]
+    found = [Judge(Held(source)).metrics(BrdfTable.sampled(source))["psnr_soft_db"] for source in map(load, RGL)]
     assert statistics.mean(found) >= 50
-    assert min(found) >= 36
+    assert min(found) >= 40
 
 
 @pytest.mark.parametrize("name", STAND_INS)
