@@ -14,6 +14,7 @@ from sommerl.compression.smrl import file
 from sommerl.compression.smrl.codes import coordinates, gain_codes, gain_values, shape_codes, shape_values
 from sommerl.reflectance.nodes import NodeLattice
 from sommerl.reflectance.reciprocal import reciprocal
+from sommerl.render.judge import JUDGED
 from sommerl.system.errors import MaterialError, OptionError
 
 A, B = (w[w[:, 2] > 0.1] for w in (random_directions(20_000, s) for s in (1, 2)))
@@ -265,7 +266,8 @@ def test_one_that_fails_does_not_hold_up_the_others(capsys, tmp_path, monkeypatc
 
     report = search.CompactReport(40.0, 1.0, [])
     monkeypatch.setattr("sommerl.compression.compact.search.compress", only_fabric)
-    monkeypatch.setattr("sommerl.render.judge.Judge.metrics", lambda *_: {"psnr_soft_db": 40.0})
+    figures = {metric.key: 1.0 for metric in JUDGED}
+    monkeypatch.setattr("sommerl.render.judge.Judge.metrics", lambda *_: figures)
     assert main(["compress", "nickel", "red-fabric", "-o", str(tmp_path), "--preset", "compact"]) == 1
     error = capsys.readouterr().err
     assert "nickel (SGD stand-in): out of reach" in error
