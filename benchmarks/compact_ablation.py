@@ -1,4 +1,5 @@
-"""What the SOM and the MAN are worth in compact materials: PSNR at one size, by how the palettes start and are refined.
+"""What the SOM and the MAN are worth in compact materials, by how the palettes start and are refined: the PSNR in soft
+light, and the judge's score, at one size.
 
 uv run python benchmarks/compact_ablation.py FOLDER [--size BYTES]
 """
@@ -15,8 +16,7 @@ from sommerl.compression.compact.fitted_table import FittedTable
 from sommerl.compression.compact.lattice_fit import Fitter
 from sommerl.compression.compact.quantise import quantise
 from sommerl.compression.compact.search import GAINS, SHAPES, usual_nodes
-from sommerl.render.compare import judge_on_sphere
-from sommerl.render.environment import default_environment
+from sommerl.render.judge import Judge, score
 
 WAYS = {
     "SOM, least squares": ("som", True),
@@ -26,17 +26,19 @@ WAYS = {
 }
 
 
-def measured(path: Path, size: int) -> list[float]:
-    """The best values of the nodes, not quantised; then each of WAYS."""
+def measured(path: Path, size: int) -> list[tuple[float, float]]:
+    """PSNR and score of the best values of the nodes, not quantised; then of each of WAYS."""
     source = load(path)
-    judge = judge_on_sphere(source, default_environment())
+    judge = Judge(source)
     fitter = Fitter(source)
     nodes = usual_nodes(size)
     problem = fitter.problem(nodes)
     gains, shapes = (round(share * nodes**0.5) for share in (GAINS, SHAPES))
 
-    def quality(values) -> float:
-        return judge(FittedTable(problem.lattice, values, fitter.scale, name=source.name))
+    def quality(values) -> tuple[float, float]:
+        made = FittedTable(problem.lattice, values, fitter.scale, signed=source.signed, name=source.name)
+        metrics = judge.metrics(made)
+        return metrics["psnr_soft_db"], score(metrics)
 
     found = [quality(problem.best)]
     for start, refine in WAYS.values():
@@ -46,7 +48,7 @@ def measured(path: Path, size: int) -> list[float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--size", type=int, default=2700, help="of the stream, in bytes")
     options = parser.parse_args()
@@ -55,8 +57,12 @@ def main() -> None:
     rows = []
     for path in sorted(options.folder.iterdir()):
         rows.append(measured(path, options.size))
-        print(f"| {path.stem} |", " | ".join(f"{value:.1f}" for value in rows[-1]), "|", flush=True)
-    print("| mean |", " | ".join(f"{value:.1f}" for value in np.mean(rows, axis=0)), "|")
+        print_row(path.stem, rows[-1])
+    print_row("mean", np.mean(rows, axis=0))
+
+
+def print_row(name: str, values) -> None:
+    print(f"| {name} |", " | ".join(f"{psnr:.1f}, {points:.2f}" for psnr, points in values), "|", flush=True)
 
 
 if __name__ == "__main__":

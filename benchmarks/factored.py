@@ -20,20 +20,20 @@ from sommerl.factored import file
 from sommerl.factored.fit import FactorOptions, factor
 from sommerl.reflectance.brdf import Brdf
 from sommerl.reflectance.distance import asymmetry
-from sommerl.render.compare import judge_on_sphere
+from sommerl.render.compare import compare_on_sphere
 from sommerl.render.environment import default_environment
 
 OPTIONS = FactorOptions(), FactorOptions(8, 4), FactorOptions(4, 2)
 
 
 def measured(brdf: Brdf) -> dict[str, Any]:
-    judge = judge_on_sphere(brdf, default_environment())
     buffers = brdf.buffers()
     row: dict[str, Any] = {"asymmetry of the source": asymmetry(lambda wi, wo: brdf.f_r(wi, wo, buffers))}
-    for options in OPTIONS:
-        material = factor(brdf, options)
+    materials = [factor(brdf, options) for options in OPTIONS]
+    comparisons = compare_on_sphere(brdf, materials, default_environment())
+    for options, material, comparison in zip(OPTIONS, materials, comparisons, strict=True):
         row[f"{options.lobes} × {options.terms}"] = {
-            "psnr_object_db": judge(material),
+            "psnr_object_db": comparison.metrics["psnr_object_db"],
             "bytes_memory": material.bytes_memory,
             "bytes_disk": len(file.encode(material)),
             **material.facts,

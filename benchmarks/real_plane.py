@@ -5,11 +5,12 @@
 PLANES.npz is shared/data/merl_plane/merl_phi90_srgb8.npz: the cells of φ_d bin 90 of MERL's tables, 8-bit sRGB, which
 is f_r, clipped to [0, 1], on sRGB's curve, times 255, rounded down. A MATERIAL is a file that `sommerl.load` reads,
 named as in the database, or FILE.npz:NAME; of an archive, all of it that is in PLANES.npz. Each is evaluated at the
-centres of these cells and brought to 8 bits in the same way. The PSNR is over the cells whose centre is above the
-horizon (8,023 of 8,100), all channels alike. Highlights above 1/sr are clipped in both, so they are not compared. Rows
-are of the stand-in and of what is made from it. At the centre of a cell, trilinear lookup gives that cell alone, so
-what it gives here is what the nearest cell does. `--sizes` without a number leaves the compact files out. Prints
-Markdown.
+centres of these cells and brought to 8 bits in the same way. There are two PSNRs: over the cells whose centre is above
+the horizon (8,023 of 8,100), and over those away from grazing, where both cosines are above 0.1 (6,984); all channels
+alike, and all cells, however little light they stand for. Highlights above 1/sr are clipped in both, so they are not
+compared. Rows are of the stand-in and of what is made from it. At the centre of a cell, trilinear lookup gives that
+cell alone, so what it gives here is what the nearest cell does. `--sizes` without a number leaves the compact files
+out. Prints Markdown.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from sommerl.reproduction.data import RULES, compressed
 
 PHI_D = 90  # the bin
 ABOVE = MERL.above_horizon[:, :, PHI_D]
+AWAY = ABOVE & (np.minimum(*MERL.cosines())[:, :, PHI_D] > 0.1)
 SIZES = (1000, 2700, 8000)
 CLUSTERS, EPOCHS = 256, 30
 ROUNDING = 1e-6  # so that 1/sr is 255: in floating point, sRGB's curve ends just below 1
@@ -49,9 +51,9 @@ def plane(brdf: Brdf) -> Plane:
     return found
 
 
-def distance(found: Plane, real: Plane) -> float:
-    """PSNR [dB] over the cells above the horizon."""
-    return psnr(found[ABOVE], real[ABOVE])
+def distance(found: Plane, real: Plane) -> tuple[float, float]:
+    """PSNR [dB] over the cells above the horizon, and over those away from grazing."""
+    return psnr(found[ABOVE], real[ABOVE]), psnr(found[AWAY], real[AWAY])
 
 
 def representations(source: Brdf, sizes: Sequence[int]) -> Iterator[tuple[str, Brdf]]:
@@ -78,8 +80,8 @@ def named(materials: Sequence[str], known: Sequence[str]) -> Iterator[tuple[str,
             raise SystemExit(f"error: {material}: expected a material of the planes, found {name}")
 
 
-def print_row(name: str, values: Sequence[float]) -> None:
-    print(f"| {name} | " + " | ".join(f"{value:.1f}" for value in values) + " |", flush=True)
+def print_row(name: str, values: Sequence[tuple[float, float]]) -> None:
+    print(f"| {name} | " + " | ".join(f"{all_:.1f}, {away:.1f}" for all_, away in values) + " |", flush=True)
 
 
 def main() -> None:
@@ -106,7 +108,8 @@ def main() -> None:
     except SommerlError as error:
         raise SystemExit(f"error: {error}") from error
     for title, over in (("mean", statistics.fmean), ("worst", min)):
-        print_row(title, [over(row["psnr_db"][key] for row in rows) for key in rows[0]["psnr_db"]])
+        columns = [[row["psnr_db"][key] for row in rows] for key in rows[0]["psnr_db"]]
+        print_row(title, [(over(a for a, _ in column), over(b for _, b in column)) for column in columns])
     print(f"\n{len(rows)} materials")
     if options.json:
         options.json.write_text(json.dumps(rows, indent=2))

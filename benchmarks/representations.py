@@ -18,8 +18,8 @@ from sommerl import Brdf, BrdfTable
 from sommerl.compression.compact.search import Compressor
 from sommerl.formats import merl, nbrdf
 from sommerl.models.nbrdf import WEIGHTS
-from sommerl.render.compare import judge_on_sphere
-from sommerl.render.environment import default_environment
+from sommerl.reflectance.reciprocal import reciprocal
+from sommerl.render.judge import Judge, score
 
 PALETTES = (256, 1000)  # of k-means
 NUMBER = 4  # bytes: float32
@@ -30,22 +30,26 @@ COLOURS = ("_rgb", "_spec")  # how RGL's files are called
 class Representation:
     """A material as it is stored.
 
-    family: the curve that it is a point of. label: what it is in tables. size: bytes stored.
-    seconds: of encoding, and bytes_memory: while it is looked up; None where there is no such thing.
+    family: the curve that it is a point of. label: what it is in tables. size: bytes stored. seconds: of encoding, and
+    bytes_memory: while it is looked up. None where there is no such thing.
     """
 
     family: str
     label: str
     brdf: Brdf
-    size: int
+    size: int | None
     seconds: float | None = None
     bytes_memory: int | None = None
 
 
-def representations(source: Brdf, stem: str, sizes: Sequence[int], networks: Path | None) -> list[Representation]:
-    """All of a material. stem: of its file, under which `networks` (.npz) has it. sizes: of compact files, in bytes."""
+def representations(
+    source: Brdf, judge: Judge, stem: str, sizes: Sequence[int], networks: Path | None
+) -> list[Representation]:
+    """All of a material. judge: of it. stem: of its file, under which `networks` (.npz) has it. sizes: of compact
+    files, in bytes."""
+    found = [] if source.reciprocal else [Representation("reciprocal", "raw → reciprocal", reciprocal(source), None)]
+    found += compact(source, judge, sizes)
     table = BrdfTable.of(source)
-    found = list(compact(source, sizes))
     found += preset(table)
     found += [palette(table, clusters) for clusters in PALETTES]
     found += network(stem, networks)
@@ -53,12 +57,12 @@ def representations(source: Brdf, stem: str, sizes: Sequence[int], networks: Pat
     return [*found, *merl_table(table)]
 
 
-def compact(source: Brdf, sizes: Sequence[int]) -> Generator[Representation]:
+def compact(source: Brdf, judge: Judge, sizes: Sequence[int]) -> Generator[Representation]:
     """Sommerl's compact files of at most so many bytes, as they are read back; seconds with the preparation."""
     if not sizes:
         return
     started = time.perf_counter()
-    compressor = Compressor(source, quality=judge_on_sphere(source, default_environment()))
+    compressor = Compressor(source, quality=lambda material: score(judge.metrics(material)))
     prepared = time.perf_counter() - started
     for size in sizes:
         started = time.perf_counter()

@@ -36,7 +36,7 @@ FOLDS = {
 
 
 def material(case="smooth", seed=0, *, folds=FOLDS["reciprocal"], signed=False):
-    """A material that is made up. signed: its gains have both signs, too."""
+    """A material that is made up. signed: its gains have both signs, too. It is smooth if it is mirrored."""
     bands, inner, gains, shapes, manner = CASES[case] if isinstance(case, str) else case
     rng = np.random.default_rng(seed)
     lattice = random_lattice(rng, bands, inner, folds)
@@ -46,7 +46,9 @@ def material(case="smooth", seed=0, *, folds=FOLDS["reciprocal"], signed=False):
         shape_codes[:] = 0
     shape_codes = shape_codes[np.lexsort(shape_codes.T[::-1])]
     gain, shape = (_entries(rng, n, lattice.size, manner) for n in (gains, shapes))
-    palette = GainsAndShapes(gain_values(gain_codes), shape_values(shape_codes), 0.1 + rng.random(), signed)
+    palette = GainsAndShapes(
+        gain_values(gain_codes), shape_values(shape_codes), 0.1 + rng.random(), signed, folds["mirrored"]
+    )
     return SomManBrdf(palette, np.stack([gain, shape]), lattice, name="made up")
 
 
@@ -102,7 +104,7 @@ def broken(body):
 def same_numbers(one, other):
     """Whether two materials look up the same, bit for bit."""
     same = one.lattice == other.lattice and one.interpolation == other.interpolation
-    same = same and (scale(one), signed(one)) == (scale(other), signed(other))
+    same = same and (scale(one), how(one)) == (scale(other), how(other))
     return same and all(a.tobytes() == b.tobytes() for a, b in zip(arrays(one), arrays(other), strict=True))
 
 
@@ -119,9 +121,9 @@ def scale(material):
     return 1.0 if material.grid else material.palette.scale
 
 
-def signed(material):
-    """Whether blended values keep their sign."""
-    return not material.grid and material.palette.signed
+def how(material):
+    """How blended values become reflectances: signed, smooth."""
+    return [not material.grid and getattr(material.palette, name) for name in ("signed", "smooth")]
 
 
 def stream(file):

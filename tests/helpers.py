@@ -76,6 +76,23 @@ def compact_material(lattice: NodeLattice, gains: int = 20, shapes: int = 15, *,
     )
 
 
+def nearest_held(colour: Any) -> NDArray[np.float64]:
+    """Of all colours with the luminance of one, and no negative channel, the nearest, found by trying: for each set of
+    channels that are not 0, the foot of the perpendicular. Black if the luminance is not positive."""
+    colour, y = np.asarray(colour, float), np.array([0.2126, 0.7152, 0.0722])
+    feet = [np.zeros(3)]
+    if colour @ y > 0:
+        kept = [np.array([chosen >> c & 1 for c in range(3)], float) for chosen in range(1, 8)]
+        moved = [one * (colour + y * ((colour - one * colour) @ y) / (one @ y**2)) for one in kept]
+        feet = [foot for foot in moved if (foot >= 0).all()]
+    return min(feet, key=lambda foot: ((foot - colour) ** 2).sum())
+
+
+def moved_share(colour: Any) -> float:
+    """The share of an even colour's energy that this moves."""
+    return float(np.abs(nearest_held(colour) - colour).sum() / np.abs(colour).sum())
+
+
 def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[Any, str, str]:
     """Exit status, standard output and standard error of a command."""
     capsys.readouterr()

@@ -38,7 +38,7 @@ KINDS = {
     "cells-nearest": cells("nearest"),
     "cells-trilinear": cells("trilinear"),
     "nodes": compact_material(NODES),
-    "fitted": FittedTable(NODES, RNG.random((NODES.size, 3)), 0.02, name="fitted"),
+    "fitted": FittedTable(NODES, RNG.random((NODES.size, 3)), 0.02, signed=False, name="fitted"),
     "rgl": rgl(),
     "neural": NeuralBrdf.from_flat(0.3 * RNG.standard_normal(WEIGHTS), name="neural"),
     "sgd": builtin("red-fabric"),

@@ -224,7 +224,6 @@ def test_convert_to_a_size(capsys, tmp_path, monkeypatch):
         return compact_material(NODES, 2, 2), search.CompactReport(40.0, 1.0, [])
 
     monkeypatch.setattr("sommerl.compression.compact.search.compress", found)
-    monkeypatch.setattr("sommerl.render.compress.judge_on_sphere", lambda *_: None)
     save(compact_material(NODES, 2, 2, name="other"), tmp_path / "in.smrl")
     for source in ("red-fabric", tmp_path / "in.smrl"):
         result = run_json(capsys, "convert", source, tmp_path / "x.smrl", "--target-size", "0.8kB")

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from helpers import lambertian_table, must_fail, random_directions, run, run_json
+from helpers import lambertian_table, moved_share, must_fail, random_directions, run, run_json
 from rgl_files import content
 
 from sommerl import MERL, BrdfTable, Lattice, TrainOptions, builtin, load, save, train
@@ -107,29 +107,57 @@ def negative(tmp_path):
 
 
 COUNTED = [
-    ["info", "{}"],
     ["convert", "{}", "x.binary"],
-    ["convert", "{}", "y.bsdf"],
     ["compress", "{}", "-o", "x.smrl", "--clusters", 2, "--epochs", 1],
-    ["factor", "{}", "-o", "x.fbrdf", "--lobes", 1, "--terms", 1],
 ]
+MOVED = moved_share([-0.1, 0.3, 0.3])
 
 
 def check_told(result):
     assert result["cells_clamped"] == MERL.above_horizon.sum()
-    assert result["energy_clamped"] == pytest.approx(1 / 7, rel=1e-5)
+    assert result["energy_clamped"] == pytest.approx(MOVED, rel=1e-5)
+    assert result["energy_averaged"] > 0
 
 
 @pytest.mark.parametrize("arguments", COUNTED, ids=lambda words: " ".join(map(str, words)))
-def test_negative_measurements_are_told(capsys, negative, tmp_path, monkeypatch, arguments):
+def test_what_a_table_cannot_hold_is_told(capsys, negative, tmp_path, monkeypatch, arguments):
     monkeypatch.chdir(tmp_path)
     result = run_json(capsys, *(str(word).format(negative) for word in arguments))
     check_told(result)
     must_fail(check_told, result | {"cells_clamped": 0})
     if "x.smrl" in arguments:
         check_told(run_json(capsys, "info", "x.smrl"))
-    if arguments[0] == "info":
-        assert f"{MERL.above_horizon.sum()}" in run(capsys, "info", negative)[1]
+    said = [*(str(word).format(negative) for word in arguments), "--overwrite"]
+    assert f"{MERL.above_horizon.sum()}" in run(capsys, *said)[1]
+
+
+def test_factors_hold_no_negative_numbers_and_say_so(capsys, negative, tmp_path):
+    result = run_json(capsys, "factor", negative, "-o", tmp_path / "x.fbrdf", "--lobes", 1, "--terms", 1)
+    assert result["cells_clamped"] > 10_000
+    assert result["energy_clamped"] == pytest.approx(MOVED, rel=1e-5)
+
+
+def test_a_measurement_keeps_its_negative_numbers(capsys, negative, tmp_path):
+    info = run_json(capsys, "info", negative)
+    assert (info["reciprocal"], info["signed"], info["cells_clamped"]) == (False, True, None)
+    assert info["facts"]["energy_negative"] == pytest.approx(1 / 7, rel=1e-5)
+    assert run_json(capsys, "convert", negative, tmp_path / "y.bsdf")["cells_clamped"] is None
+    up = np.array([0.3, 0.1, np.sqrt(0.9)])
+    assert np.allclose(load(tmp_path / "y.bsdf").eval(up, up), load(negative).eval(up, up), rtol=0.02)
+    assert load(tmp_path / "y.bsdf").eval(up, up)[0] < 0
+
+
+def test_reciprocal_averages_both_orders(capsys, negative, tmp_path):
+    run_json(capsys, "convert", negative, tmp_path / "y.bsdf", "--reciprocal")
+    kept, averaged = load(negative), load(tmp_path / "y.bsdf")
+    one, other = np.array([0.0, 0.0, 1.0]), np.array([0.6, 0.0, 0.8])
+    both = [kept.eval(one, other)[1], kept.eval(other, one)[1]]
+    assert abs(both[0] - both[1]) > 0.1 * both[0]
+    assert np.allclose([averaged.eval(one, other)[1], averaged.eval(other, one)[1]], np.mean(both), rtol=0.05)
+    code, _, complaint = run(capsys, "convert", negative, tmp_path / "y.xml", "--reciprocal")
+    assert (code > 0, "--reciprocal: expected an output that holds the material" in complaint) == (True, True)
+    code, _, complaint = run(capsys, "compress", negative, "-o", tmp_path / "z.smrl", "--reciprocal")
+    assert (code > 0, "--reciprocal: expected --preset compact, found paper" in complaint) == (True, True)
 
 
 @pytest.mark.parametrize("extension", ["h", "hpp", "glsl", "hlsl"])
@@ -224,10 +252,10 @@ def test_what_was_clamped_or_changed_is_written_anew(tmp_path):
     source = tmp_path / "a.binary"
     source.write_bytes(np.array(stored.shape[1:], "<i4").tobytes() + stored.tobytes())
     table = merl.read(source)
-    assert table.cells_clamped == 1
+    assert table.counts.cells_clamped == 1
     table.values[3, 4, 5] *= 2
     merl.write(table, tmp_path / "b.binary")
     again = np.frombuffer((tmp_path / "b.binary").read_bytes(), "<f8", offset=12).reshape(stored.shape)
     assert again[1, 20, 10, 90] == 0
     assert again[0, 3, 4, 5] == pytest.approx(2 * stored[0, 3, 4, 5])
-    assert (again != stored).sum() == 4
+    assert (again != stored).sum() == 3 + 3  # the colour that had a negative channel, and the one that was doubled

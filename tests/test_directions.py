@@ -106,7 +106,6 @@ def test_measurements_may_be_negative_and_are_finite():
         *(rgl._buffers["theta_i"], rgl._buffers["vndf"].reshape(-1, *rgl._shapes["vndf"])),
         -rgl._buffers["rgb"].reshape(shape),
         *(rgl._buffers[name].reshape(rgl._shapes[name]) for name in ("ndf", "sigma")),
-        reciprocal=False,
     )
     values = raw.eval(A, B)
     assert np.isfinite(values).all()

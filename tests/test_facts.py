@@ -58,11 +58,13 @@ def test_rmse_and_relative_error():
 
 
 def test_cells_and_energy_clamped():
-    """One cell of two holds -1, NaN and 3: of 3 · 0.853553 + 4 · 0.146447, the 1 · 0.146447 is lost."""
+    """One cell of two holds -1, NaN and 3. Its luminance, NaN counted as 0, is 0.004: that of a blue of 0.004 / 0.0722,
+    0.055402, which it becomes. Of 3 · 0.853553 + 4 · 0.146447, to which NaN adds nothing, (1 + 2.944598) · 0.146447 are
+    moved."""
     table = BrdfTable([[[[1, 1, 1]], [[-1, np.nan, 3]]]], IN_THETA_D)
-    assert table.cells_clamped == 1
-    check(table.energy_clamped, 0.0465435)
-    must_fail(check, table.energy_clamped, 1 / 7)  # as without weights
+    assert table.counts.cells_clamped == 1
+    check(table.counts.energy_clamped, 0.183595)
+    must_fail(check, table.counts.energy_clamped, 3.944598 / 7)  # as without weights
 
 
 def test_asymmetry():

@@ -61,7 +61,7 @@ def test_tables_hold_the_formula_at_the_cell_centres():
 def test_tables_are_usable(name):
     table = builtin_table(name)
     assert np.isfinite(table.values).all()
-    assert table.cells_clamped == 0
+    assert table.counts.cells_clamped == 0
 
 
 def check_noise(clean, noisy):

@@ -23,7 +23,8 @@ def _script():
 
 real_plane = _script()
 SEEN = (3, 5)  # (θ_h, θ_d) of a cell above the horizon
-HIDDEN = (89, 89)  # and of one that is not
+GRAZING = (0, 87)  # of one where both cosines are 0.04
+HIDDEN = (89, 89)  # and of one that is not above it
 
 
 def linear(byte):
@@ -61,18 +62,20 @@ def test_it_is_of_one_bin_of_phi_d():
         must_fail(check_plane, table([1.0, 1.0, 1.0], beside), [255, 255, 255])
 
 
-def check_distance(found, real, expected):
-    assert real_plane.distance(found, real) == pytest.approx(expected)
+def check_distance(found, real, all_, away):
+    assert real_plane.distance(found, real) == pytest.approx((all_, away))
 
 
-def test_the_distance_is_over_the_cells_above_the_horizon():
-    cells = int(real_plane.ABOVE.sum())
-    assert cells == 8023
-    one_off = 10 * np.log10(255**2 * 3 * cells)  # a difference of 1 in one channel of one cell
-    check_distance(by_hand([127, 5, 255]), by_hand([126, 5, 255]), one_off)
-    check_distance(by_hand([255, 0, 0]), by_hand([0, 0, 0]), 10 * np.log10(3 * cells))  # not 8 bits wrapped around
-    check_distance(by_hand([255] * 3, HIDDEN), by_hand([0] * 3), np.inf)
-    must_fail(check_distance, by_hand([1, 0, 0]), by_hand([0, 0, 0]), np.inf)
+def test_the_distance_is_over_the_cells_above_the_horizon_and_away_from_grazing():
+    cells = [int(each.sum()) for each in (real_plane.ABOVE, real_plane.AWAY)]
+    assert cells == [8023, 6984]
+    one_off = [10 * np.log10(255**2 * 3 * count) for count in cells]  # a difference of 1 in one channel of one cell
+    check_distance(by_hand([127, 5, 255]), by_hand([126, 5, 255]), *one_off)
+    farthest = [10 * np.log10(3 * count) for count in cells]  # not 8 bits wrapped around
+    check_distance(by_hand([255, 0, 0]), by_hand([0, 0, 0]), *farthest)
+    check_distance(by_hand([255] * 3, HIDDEN), by_hand([0] * 3), np.inf, np.inf)
+    check_distance(by_hand([1, 0, 0], GRAZING), by_hand([0, 0, 0]), one_off[0], np.inf)
+    must_fail(check_distance, by_hand([1, 0, 0]), by_hand([0, 0, 0]), one_off[0], np.inf)
 
 
 def test_names_are_the_databases(tmp_path):

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .models.builtin import NAMES, builtin, builtin_table
     from .reflectance.brdf import Brdf
     from .reflectance.cells import MERL, Lattice
+    from .reflectance.reciprocal import reciprocal
     from .reflectance.table import BrdfTable
     from .render.compress import compress
     from .system.errors import SommerlError
@@ -40,6 +41,7 @@ __all__ = [
     "compress",
     "load",
     "load_table",
+    "reciprocal",
     "save",
     "threads",
     "train",
@@ -60,6 +62,7 @@ _MODULES = {
     "compress": "render.compress",
     "load": "formats.load",
     "load_table": "formats.load",
+    "reciprocal": "reflectance.reciprocal",
     "save": "compression.smrl.file",
     "train": "compression.paper.train",
 }

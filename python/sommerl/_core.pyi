@@ -213,9 +213,10 @@ class NodeLookup:
         reciprocal: bool = True,
         mirrored: bool = False,
         signed: bool = False,
+        smooth: bool = False,
     ) -> None:
         """theta_h, band, theta_d, phi_d, reciprocal, mirrored: the fields of the `NodeLattice`. gains (G,), shapes
-        (S, 3), gain (nodes,) and shape (nodes,): y of a node is gains[gain] · shapes[shape]. scale, signed: see
+        (S, 3), gain (nodes,) and shape (nodes,): y of a node is gains[gain] · shapes[shape]. scale, signed, smooth: see
         `nodes.from_cube_root`. Raises ValueError for what does not fit.
         """
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import compact
 import numpy as np
 import pytest
-from compact import FOLDS, arrays, broken, same_numbers, scale, sealed, signed
+from compact import FOLDS, arrays, broken, how, same_numbers, scale, sealed
 from helpers import SMALL, lambertian_table, must_fail, random_directions
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -151,20 +151,20 @@ def numbers(material):
     """The SHA-256 of all that a lookup reads."""
     lattice = material.lattice.axes() if not material.grid else (*material.lattice.shape, material.lattice.reciprocal)
     said = [lattice, material.interpolation, scale(material).hex()]
-    flags = PLAIN if material.grid else [*material.lattice.folds.values(), signed(material)]
+    flags = PLAIN if material.grid else [*material.lattice.folds.values(), *how(material)]
     said += flags if flags != PLAIN else []
     head = json.dumps(said)
     return hashlib.sha256(head.encode() + b"".join(part.tobytes() for part in arrays(material))).hexdigest()
 
 
-PLAIN = [True, False, False]  # reciprocal, mirrored, signed, as all of version 1
+PLAIN = [True, False, False, False]  # reciprocal, mirrored, signed, smooth, as all of version 1
 NUMBERS = {
     "cells": "913e749eb881f4fccfa484c0a99302f08a75242e85d66e9bce20b580e9857493",
     "nodes": "a615619ef7e248e2ccb59cd9e6e8ff0db66fdc3e74a35be52f621df69ace5c94",
     "nodes-2-reciprocal": "4e0137585f3ec6336271205c83626530a14ce09f574524aad8c817e323a816e5",
-    "nodes-2-mirrored": "3117e099ad510cb6f695ec253afc2e08b7626b2b7f15ae649365c3eb8d7381ec",
-    "nodes-2-both": "f9fe55657cdaa9bbdb562dc079310dfded580587a66d21f416ccbd2f57ea945c",
-    "nodes-2-neither": "43849f1ab1cfc43bc00dc87a909ca5fbd3a5900a32225ce38a9d1e493607feb2",
+    "nodes-2-mirrored": "1e2e38b845415242468facdb2ad703b3ec9e95defc019c00bdba9a8246f60489",
+    "nodes-2-both": "5ec2cafd653e27e272a2ffb8ab5bf1fb2dde6901129064948cbd28f546d0c4a3",
+    "nodes-2-neither": "ea3c88cf90c5bf2269b0755bf39cc5dd2402032c06c421ec719e70607d192736",
 }
 
 
@@ -365,13 +365,13 @@ def test_flags():
     stream, head = compact.stream(encode(compact.material("minimal")))
     for flags in range(256):
         data = sealed(head[:-1] + bytes([flags]) + stream)
-        if flags > 7:
-            with pytest.raises(FormatError, match=f"^expected flags from 0 to 7, found {flags}$"):
+        if flags > 15:
+            with pytest.raises(FormatError, match=f"^expected flags from 0 to 15, found {flags}$"):
                 decode(data)
         else:
             found = decode(data)  # of a lattice with one node in φ_d, which means the same with all folds
             assert (found.lattice.reciprocal, found.lattice.mirrored) == (flags & 1 > 0, flags & 2 > 0)
-            assert found.palette.signed == (flags & 4 > 0)
+            assert how(found) == [flags & 4 > 0, flags & 8 > 0]
 
 
 def check_allocates(data, most):

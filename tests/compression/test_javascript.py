@@ -17,11 +17,11 @@ from compact import (
     bomb,
     broken,
     hostile_streams,
+    how,
     in_version_1,
     material,
     scale,
     sealed,
-    signed,
     stream,
 )
 from helpers import must_fail, tool
@@ -92,7 +92,11 @@ def described(made):
         axes = dict(zip(("thetaH", "thetaD", "phiD"), lattice.shape, strict=True))
         return known | {"kind": "cells", "lattice": axes | {"reciprocal": lattice.reciprocal}}
     axes = dict(zip(("thetaH", "band", "thetaD", "phiD"), lattice.axes(), strict=True))
-    known |= {"kind": "nodes", "lattice": axes | lattice.folds, "signed": signed(made)}
+    known |= {
+        "kind": "nodes",
+        "lattice": axes | lattice.folds,
+        **dict(zip(("signed", "smooth"), how(made), strict=True)),
+    }
     return known | {"gains": gains, "gainIndex": gain_index}
 
 
@@ -247,7 +251,7 @@ def test_all_decoders_find_the_same_or_say_the_same(node, kind):
         before, flags = (head[:-4], b"") if version == 1 else (head[:-5], head[-1:])
         scales = [struct.pack("<f", scale) for scale in (0, -1, np.nan, np.inf, 1e-45)]
         contents += [closed(before + scale + flags + stream_) for scale in scales]
-        contents += [closed(head[:-1] + bytes([flags]) + stream_) for flags in (*range(10), 255)]
+        contents += [closed(head[:-1] + bytes([flags]) + stream_) for flags in (*range(18), 255)]
     found, wanted = node(contents), list(map(read, contents))
     check_same(found, wanted)
     if nodes:

@@ -157,7 +157,8 @@ def test_the_command(capsys, tmp_path):
     assert result["bytes_disk"] == path.stat().st_size
     assert result["bytes_memory"] == 4 * (3 * 3 * ELEVATIONS + 6 * ROWS + 6 * COLUMNS)
     info = run_json(capsys, "info", path)
-    described = info.keys() - {"input", "materials"}
+    assert (result["cells_clamped"], result["energy_clamped"]) == (0, 0)  # which a file does not hold
+    described = info.keys() - {"input", "materials", "cells_clamped", "energy_clamped"}
     assert {key: result[key] for key in described} == {key: info[key] for key in described}
     assert 0 < info["facts"]["asymmetry"] < 1
     status, out, _ = run(capsys, "factor", "nickel", "-o", path, "--lobes", 1, "--terms", 1)

@@ -85,7 +85,9 @@ def folded(case):
     lattice, signed = FOLDED[case]
     made = compact_material(lattice, 20, 15)
     gains = np.sort(np.concatenate([made.palette.gains[::2], -made.palette.gains[1::2]]))
-    return SomManBrdf(GainsAndShapes(gains, made.lut, 0.04, signed), made.index, lattice, name="folded")
+    return SomManBrdf(
+        GainsAndShapes(gains, made.lut, 0.04, signed, lattice.mirrored), made.index, lattice, name="folded"
+    )
 
 
 def run(folder, real, call="eval", a=A, b=B):

@@ -40,7 +40,7 @@ def test_round_trip(tmp_path, lattice):
     assert isinstance(again, BrdfTable)
     assert again.lattice == lattice
     assert np.allclose(again.values, table.values, rtol=1e-15, atol=0)
-    assert again.cells_clamped == 0
+    assert again.counts.cells_clamped == 0
     assert again.name == "table"
 
 
@@ -125,4 +125,4 @@ def test_nan_and_infinities_are_clamped_and_counted(tmp_path):
     planes[0, 0], planes[1, 1], planes[:, 2] = np.nan, -np.inf, np.inf
     path = tmp_path / "holes.binary"
     path.write_bytes(raw(planes=planes))
-    assert load(path).cells_clamped == 3
+    assert load(path).counts.cells_clamped == 3

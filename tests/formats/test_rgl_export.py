@@ -47,7 +47,7 @@ def test_our_reader_renders_the_file_as_the_material(tmp_path, name):
     sampler = BlinnPhongSampler.fitted(source)
     images = [
         render(sphere(brdf, default_environment(), sampler=sampler, size=64), spp=64)
-        for brdf in (source, rgl.read(path, reciprocal=False))
+        for brdf in (source, rgl.read(path))
     ]
     assert image_metrics(images[0].pixels, images[1].pixels, images[0].mask)["psnr_object_db"] >= 45
 

@@ -1,12 +1,13 @@
 import numpy as np
 import pytest
-from helpers import must_fail, random_directions
+from helpers import moved_share, must_fail, nearest_held, random_directions
 
 from sommerl import MERL, BrdfTable, Lattice, builtin
 from sommerl.formats import scattered
 from sommerl.formats.scattered import to_table
 from sommerl.plots import coverage
 from sommerl.reflectance.distance import table_metrics
+from sommerl.reflectance.info import Counts
 from sommerl.reflectance.samples import Samples
 from sommerl.system.errors import FormatError, MissingDependencyError
 
@@ -170,23 +171,23 @@ def test_scipy_is_asked_for_by_a_sentence(monkeypatch):
 
 
 def check_counted(table, cells, energy):
-    assert (table.cells_clamped, table.energy_clamped) == (cells, pytest.approx(energy, abs=1e-6))
+    assert (table.counts.cells_clamped, table.counts.energy_clamped) == (cells, pytest.approx(energy, abs=1e-6))
 
 
 def test_what_goes_below_zero_is_counted():
     above = int(MERL.above_horizon.sum())
     f_r = np.full((len(A), 3), 0.3)
     check_counted(to_table(Samples(A, B, f_r), name="x"), 0, 0)
-    table = to_table(Samples(A, B, f_r * [1, -1, 0.5]), name="x")
-    check_counted(table, above, 1 / 2.5)
-    assert (table.values[..., 1] == 0).all()
+    table = to_table(Samples(A, B, f_r * [1, 1, -0.5]), name="x")
+    check_counted(table, above, moved_share([1, 1, -0.5]))
+    assert np.allclose(table.values, 0.3 * nearest_held([1, 1, -0.5]))
     assert table.facts["samples_negative"] == len(A)
     must_fail(check_counted, table, 0, 0)
     few = np.where((A[:, 2] > 0.95)[:, None], -f_r, f_r)
     table = to_table(Samples(A, B, few), name="x")
     assert table.facts["samples_negative"] == (A[:, 2] > 0.95).sum()
-    assert 0 < table.cells_clamped < above / 2
-    assert 0 < table.energy_clamped < 0.2
+    assert 0 < table.counts.cells_clamped < above / 2
+    assert 0 < table.counts.energy_clamped < 0.2
 
 
 @pytest.mark.parametrize("value", [1e39, -1e39, 1e308])
@@ -204,7 +205,7 @@ def test_the_largest_and_the_smallest_values(value):
     f_r[::5, 2] = value
     table = to_table(Samples(A, B, f_r), name="x")
     assert np.isfinite(table.values).all()
-    assert 0 < table.energy_clamped <= 1
+    assert 0 < table.counts.energy_clamped <= 1
 
 
 def check_both_sides(samples, mirrored, expected_wi):
@@ -233,14 +234,19 @@ def test_mirror_images_by_hand():
 
 
 def test_cells_and_energy_of_what_goes_below_zero_by_hand():
-    """One channel at -1, of which the table holds nothing: 1 of 3 is lost, whatever the weights of cells. Or none."""
+    """One channel at -1, of which the table holds nothing, whatever the weights of cells. Or nothing is moved."""
     lattice = Lattice(1, 2, 1)
-    values, held = np.ones((1, 2, 1, 3)), np.ones((1, 2, 1, 3))
-    values[..., 0], held[..., 0] = -1, 0
-    cells, energy = scattered._clamped(lattice, values, BrdfTable(held, lattice))
-    assert (cells, energy) == (2, pytest.approx(1 / 3))
+    values = np.ones((1, 2, 1, 3))
+    values[..., 0] = -1
+    held = nearest_held([-1, 1, 1])
+    moved = np.abs(held - [-1, 1, 1]).sum()
+    found = scattered._changed(lattice, values, BrdfTable(values, lattice))
+    assert (found.cells_clamped, found.energy_clamped) == (
+        2,
+        pytest.approx(moved / (held.sum() + moved)),
+    )
     table = BrdfTable(np.ones((1, 2, 1, 3)), lattice)
-    assert scattered._clamped(lattice, np.ones((1, 2, 1, 3)), table) == (0, 0.0)
+    assert scattered._changed(lattice, np.ones((1, 2, 1, 3)), table) == Counts(0, 0.0, 0.0)
 
 
 def check_height(found, by_hand):

@@ -1,58 +1,79 @@
-"""A candidate is shown at the reference's exposure: one that is darker is wrong, however it would look by itself."""
-
-from math import log10
+"""The judge that renders nothing."""
 
 import numpy as np
 import pytest
 from helpers import lambertian_table, must_fail
 
-from sommerl.render import compare
-from sommerl.render.compare import compare_on_sphere, judge_on_sphere
-from sommerl.render.environment import default_environment
-from sommerl.render.frame import Image
-from sommerl.render.metrics import exposure
-
-GREY, DARKER = lambertian_table(0.5), lambertian_table(0.45)
-# The reference's level goes to 0.6, and 0.9 of it to 0.54: 203 and 194 in 8-bit sRGB (255 · 0.7977 = 203.4 and
-# 255 · 0.7611 = 194.1), which is 20 lg(255 / 9) = 29.05 dB.
-BY_HAND = 20 * log10(255 / 9)
+from sommerl import builtin
+from sommerl.models.builtin import builtin_table
+from sommerl.reflectance.brdf import Brdf
+from sommerl.render import judge
+from sommerl.render.judge import Judge, score
 
 
-def shown(brdf):
-    """The picture of an even object that fills half of the frame; nobody renders it."""
-    pixels = np.zeros((8, 16, 3), np.float32)
-    pixels[:, :8] = 0.7 * brdf.values.max()
-    return Image(pixels, np.broadcast_to(np.arange(16) < 8, (8, 16)))
+class Scaled(Brdf):
+    name = "scaled"
+
+    def __init__(self, brdf, factor):
+        self._brdf, self._factor = brdf, factor
+
+    def f_r(self, wi, wo, buffers):
+        return tuple(self._factor * c for c in self._brdf.f_r(wi, wo, self._brdf.buffers()))
 
 
-@pytest.fixture
-def judged(monkeypatch):
-    """The PSNR over the object of the darker one, by the function that the search is handed."""
-    monkeypatch.setattr(compare, "sphere", lambda brdf, *_, **__: brdf)
-    monkeypatch.setattr(compare, "render", shown)
-    return lambda: judge_on_sphere(GREY, default_environment(8))(DARKER)
+def test_the_same_is_identical():
+    found = Judge(builtin("nickel")).metrics(builtin("nickel"))
+    assert found == {
+        "psnr_soft_db": float("inf"),
+        "psnr_lamp_db": float("inf"),
+        "log_error": 0,
+        "log_error_grazing": 0,
+        "albedo_ratio": 1,
+    }
+    assert np.isfinite(score(found))
 
 
-def check_psnr(psnr):
-    assert psnr == pytest.approx(BY_HAND, abs=1e-6)
+def check_twice_as_bright(found, f):
+    """Of a Lambertian with f_r = f: all logarithms differ by log((2 f + 0.001) / (f + 0.001))."""
+    difference = np.log((2 * f + 0.001) / (f + 0.001))
+    assert found["log_error"] == pytest.approx(difference, rel=1e-9)
+    assert found["log_error_grazing"] == pytest.approx(difference, rel=1e-9)
+    assert found["albedo_ratio"] == pytest.approx(2, rel=1e-6)
 
 
-def test_the_judge_exposes_a_candidate_as_the_reference(judged):
-    check_psnr(judged())
+def test_a_lambertian_by_hand():
+    grey = lambertian_table(0.3)
+    found = Judge(grey).metrics(lambertian_table(0.6))
+    check_twice_as_bright(found, 0.3 / np.pi)
+    must_fail(check_twice_as_bright, Judge(grey).metrics(lambertian_table(0.61)), 0.3 / np.pi)
+    assert 10 < found["psnr_soft_db"] < 25
 
 
-def test_so_does_a_comparison(monkeypatch):
-    monkeypatch.setattr(compare, "sphere", lambda brdf, *_, **__: brdf)
-    monkeypatch.setattr(compare, "render_all", lambda scenes, **_: [shown(scene()) for scene in scenes])
-    found = compare_on_sphere(GREY, [DARKER], default_environment(8))[0]
-    check_psnr(found.metrics["psnr_object_db"])
-    assert [int(image[0, 0, 0]) for image in found.exposed()] == [203, 194]
+def lambertian_under(lamps, power, albedo):
+    """A diffuse sphere's pixels, straight from Lambert's law."""
+    at = (np.arange(judge.SIDE) + 0.5) / judge.SIDE * 2 - 1
+    pixels = [(x, -y) for y in at for x in at if x * x + y * y < 1 - 1 / judge.SIDE]
+    normals = np.array([[x, y, np.sqrt(1 - x * x - y * y)] for x, y in pixels])
+    return albedo / np.pi * np.maximum(normals @ lamps.T, 0) @ power
 
 
-def test_that_check_notices_a_candidate_exposed_by_itself(judged, monkeypatch):
-    def alone(image):
-        return image.pixels * exposure(image.pixels, image.mask)
+def test_lamps_light_a_sphere_by_lamberts_law():
+    seen = judge.seen(lambertian_table(0.5))
+    for found, lamps in ((seen.soft, judge._lamps()), (seen.lamp, judge._key_lamp())):
+        assert np.allclose(found, lambertian_under(*lamps, 0.5), rtol=1e-9)
+    assert np.allclose(seen.albedo, 0.5, rtol=0.02)
+    picture = judge.under_one_lamp(lambertian_table(0.5), judge.SIDE)
+    assert picture.shape == (judge.SIDE, judge.SIDE, 3)
+    lit = picture.any(axis=-1)
+    assert lit.sum() == seen.lamp.any(axis=-1).sum() > 1000
+    assert np.array_equal(picture[lit], seen.lamp[seen.lamp.any(axis=-1)])
 
-    monkeypatch.setattr(compare, "exposure", lambda *_: 1.0)
-    monkeypatch.setattr(compare, "render", lambda brdf: Image(alone(shown(brdf)), shown(brdf).mask))
-    must_fail(check_psnr, judged())
+
+def test_nearer_is_better():
+    source = builtin("blue-metallic-paint")
+    of = Judge(source)
+    table = builtin_table("blue-metallic-paint")
+    found = [of.metrics(each) for each in (table, table.with_interpolation("nearest"), Scaled(source, 1.3))]
+    assert found[0]["psnr_soft_db"] > found[1]["psnr_soft_db"] > found[2]["psnr_soft_db"] > 15
+    assert score(found[0]) > score(found[1]) > score(found[2])
+    assert found[2]["albedo_ratio"] == pytest.approx(1.3, rel=1e-6)

@@ -13,13 +13,14 @@ from ..reflectance.lattice import Interpolation
 from ..reflectance.table import BrdfTable
 from ..render.compare import compare_on_sphere
 from ..render.images import side_by_side, write_image
+from ..render.judge import Judge
 from . import answers, console
 from .arguments import Material, option, positional
 from .checks import check_output
 from .inputs import labels
 from .parser import add_command
 from .rendering import RenderingArguments, Sampling, check_environment, environment_of
-from .rows import image_rows, table_rows
+from .rows import image_rows, judged_rows, table_rows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,18 +60,21 @@ def compare(options: CompareArguments) -> dict[str, Any]:
         comparison = compare_on_sphere(brdfs[0], [brdfs[1]], environment, **asdict(sampling), progress=advance)[0]
     if options.output:
         write_image(options.output, side_by_side(comparison.pictures()))
+    with console.progress("judging"):
+        judged = Judge(brdfs[0]).metrics(brdfs[1])
     metrics = table_distance(*brdfs)
     reference, candidate = (
         f"{label} ({brdf.lookup})"
         for label, brdf in zip(labels(sources, [brdf.name for brdf in brdfs]), brdfs, strict=True)
     )
     result: dict[str, Any] = comparison.metrics | {f"table_{name}": value for name, value in metrics.items()}
-    result |= {"reference": reference, "candidate": candidate}
+    result |= judged | {"reference": reference, "candidate": candidate}
     if options.output:
         result["image"] = str(options.output)
     if not options.json:
         lookups = dict.fromkeys((brdfs[1].lookup, brdfs[0].lookup))
-        rows = {"lookup": " against ".join(lookups)} | image_rows(comparison.metrics) | table_rows(metrics)
+        rows = {"lookup": " against ".join(lookups)} | image_rows(comparison.metrics)
+        rows |= judged_rows(judged) | table_rows(metrics)
         console.print_rows(f"{options.candidate} against {options.reference}", rows)
         if options.output:
             console.wrote([options.output])

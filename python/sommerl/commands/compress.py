@@ -12,13 +12,14 @@ from ..compression.material import SomManBrdf
 from ..compression.paper.options import Order, Rule, Topology, TrainOptions
 from ..compression.paper.train import TrainReport, train
 from ..compression.smrl import file as smrl
-from ..formats.load import load, load_table
+from ..formats.load import load
 from ..reflectance.brdf import Brdf
 from ..reflectance.distance import table_metrics
 from ..reflectance.info import Counts
-from ..reflectance.metric import decibels
+from ..reflectance.reciprocal import reciprocal as averaged
 from ..reflectance.table import BrdfTable
 from ..render.compress import compress as compressed
+from ..render.judge import Judge
 from ..system.errors import OptionError, SommerlError
 from . import answers, console
 from .arguments import Material, WritingArguments, byte_count, flag, library_options, option, positional
@@ -27,7 +28,7 @@ from .folders import make_folder
 from .inputs import expanded, is_several, readable, stem
 from .outcome import PartlyDone
 from .parser import add_command
-from .rows import fact_rows, origin_rows, table_rows
+from .rows import changed_rows, fact_rows, judged_rows, origin_rows, table_rows
 
 DEFAULTS = TrainOptions()
 METRICS_DIGITS = 6  # so that the file does not hold the last bits of a machine's sums
@@ -61,7 +62,10 @@ class CompressArguments(WritingArguments):
         default=None,
         metavar="DB",
         instead_of="target",
-        help=f"compact: the smallest file of at least that quality on a rendered sphere ({DEFAULT_PSNR:g})",
+        help=f"compact: the smallest file of at least that PSNR on a sphere in soft light ({DEFAULT_PSNR:g})",
+    )
+    reciprocal: bool = option(
+        default=False, help="compact: the mean of both orders of the directions, which a file holds with fewer nodes"
     )
     clusters: int = option(
         default=DEFAULTS.clusters, metavar="M", help="paper: the number of entries in the palette (%(default)s)"
@@ -114,7 +118,7 @@ def compress(options: CompressArguments) -> dict[str, Any]:
     failed = 0
     for source, output in zip(sources, outputs, strict=True):
         try:
-            results.append(_compressed(source, output, method, options.json))
+            results.append(_compressed(source, output, method, options))
         except SommerlError as error:  # a target out of one material's reach is no reason to leave out the others
             if len(sources) == 1:
                 raise
@@ -127,10 +131,12 @@ def compress(options: CompressArguments) -> dict[str, Any]:
     return answer
 
 
-def _compressed(source: str, output: Path, method: CompactOptions | TrainOptions, quiet: bool) -> dict[str, Any]:
+def _compressed(
+    source: str, output: Path, method: CompactOptions | TrainOptions, options: CompressArguments
+) -> dict[str, Any]:
     if isinstance(method, CompactOptions):
-        return compact_one(source, load(source), output, method, quiet)
-    return compress_one(source, load_table(source), output, method, quiet)
+        return compact_one(source, load(source), output, method, options.json, reciprocal=options.reciprocal)
+    return compress_one(source, load(source), output, method, options.json)
 
 
 def _method(options: CompressArguments) -> CompactOptions | TrainOptions:
@@ -142,8 +148,8 @@ def _method(options: CompressArguments) -> CompactOptions | TrainOptions:
             if each.name != "seed" and getattr(options, each.name) != getattr(DEFAULTS, each.name):
                 raise OptionError(f"{flag(each.name)}: expected --preset paper, found compact")
         return library_options(CompactOptions, options)
-    for name in ("target_size", "target_psnr"):
-        if getattr(options, name) is not None:
+    for name in ("target_size", "target_psnr", "reciprocal"):
+        if getattr(options, name):
             raise OptionError(f"{flag(name)}: expected --preset compact, found paper")
     return library_options(TrainOptions, options)
 
@@ -166,26 +172,31 @@ def _outputs(sources: Sequence[str], output: Path, *, several: bool) -> list[Pat
     return outputs
 
 
-def compress_one(source: str, table: BrdfTable, output: Path, options: TrainOptions, quiet: bool) -> dict[str, Any]:
-    """Compresses a table by the preset paper into a file, and shows what came of it unless `quiet`.
+def compress_one(source: str, brdf: Brdf, output: Path, options: TrainOptions, quiet: bool) -> dict[str, Any]:
+    """Compresses a material as a table by the preset paper into a file, and shows what came of it unless `quiet`.
 
-    source: where the table is from, as it was given.
+    source: where the material is from, as it was given.
     """
-    material, report = trained(table, options)
+    material, report = trained(BrdfTable.of(brdf), options)
     written = smrl.save(material, output)
-    result = answers.described(source, material, written) | asdict(report)
+    metrics = Judge(brdf).metrics(material)
+    result = answers.described(source, material, written) | asdict(report) | metrics
     if not quiet:
-        console.print_rows(f"{material.name} → {output}", compression_rows(material, written, report))
+        console.print_rows(
+            f"{material.name} → {output}", judged_rows(metrics) | compression_rows(material, written, report)
+        )
     return result | {"epochs": options.epochs, "output": str(output)}
 
 
-def compact_one(source: str, brdf: Brdf, output: Path, options: CompactOptions, quiet: bool) -> dict[str, Any]:
-    """The same by the preset compact, for a material of any kind."""
-    material, report = fitted(brdf, options)
+def compact_one(
+    source: str, brdf: Brdf, output: Path, options: CompactOptions, quiet: bool, *, reciprocal: bool = False
+) -> dict[str, Any]:
+    """The same by the preset compact. reciprocal: see `render.compress`."""
+    material, report = fitted(brdf, options, reciprocal=reciprocal)
     written = smrl.save(material, output)
     result = answers.described(source, material, written)
-    result |= {"options": asdict(options), "psnr_object_db": report.psnr_db}
-    counts = brdf.counts
+    result |= {"options": asdict(options), **report.metrics, "psnr_object_db": report.metrics["psnr_soft_db"]}
+    counts = averaged(brdf).counts if reciprocal else brdf.counts
     result |= {"seconds": report.seconds, "output": str(output), **asdict(counts)}
     result |= dict.fromkeys(("epochs", "quantisation_error", "units_dropped"))
     if not quiet:
@@ -193,10 +204,10 @@ def compact_one(source: str, brdf: Brdf, output: Path, options: CompactOptions, 
     return result
 
 
-def fitted(brdf: Brdf, options: CompactOptions) -> tuple[SomManBrdf, CompactReport]:
-    """Compresses by the preset compact under a progress bar."""
+def fitted(brdf: Brdf, options: CompactOptions, *, reciprocal: bool = False) -> tuple[SomManBrdf, CompactReport]:
+    """Compresses by the preset compact under a progress bar. reciprocal: see `render.compress`."""
     with console.progress(f"compressing {brdf.name}") as advance:
-        return compressed(brdf, **asdict(options), progress=advance)
+        return compressed(brdf, **asdict(options), reciprocal=reciprocal, progress=advance)
 
 
 def trained(table: BrdfTable, options: TrainOptions) -> tuple[SomManBrdf, TrainReport]:
@@ -206,7 +217,7 @@ def trained(table: BrdfTable, options: TrainOptions) -> tuple[SomManBrdf, TrainR
     metrics = table_metrics(table.values, material.values, table.lattice)
     measured = metrics | {"quantisation_error": report.quantisation_error[-1]}
     material.metrics = {name: _rounded(value) for name, value in measured.items()}
-    facts = table.facts | (asdict(table.counts) if table.cells_clamped else {})
+    facts = table.facts | {name: value for name, value in asdict(table.counts).items() if value}
     if facts:
         material.options["source_facts"] = {name: _rounded(value) for name, value in facts.items()}
     return material, report
@@ -236,10 +247,8 @@ def compact_rows(material: SomManBrdf, bytes_disk: int, report: CompactReport, c
     rows = {
         "nodes": str(material.lattice.size),
         "palette": f"{material.clusters - len(material.lut)} gains, {len(material.lut)} shapes",
-        "PSNR, object, on a sphere": decibels(report.psnr_db) if report.psnr_db is not None else "not measured",
+        **judged_rows(report.metrics),
         "size in memory": console.size(material.bytes_memory),
         "size on disk": console.size(bytes_disk),
     }
-    if counts.cells_clamped:
-        rows |= fact_rows(asdict(counts))
-    return rows | origin_rows(material) | {"time": f"{report.seconds:.1f} s"}
+    return rows | changed_rows(counts) | origin_rows(material) | {"time": f"{report.seconds:.1f} s"}

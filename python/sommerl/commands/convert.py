@@ -17,6 +17,7 @@ from ..models.builtin import NAMES, builtin_table
 from ..plots import coverage
 from ..reflectance.brdf import Brdf
 from ..reflectance.info import Counts
+from ..reflectance.reciprocal import reciprocal
 from ..reflectance.table import BrdfTable
 from ..system.errors import OptionError
 from . import answers, console
@@ -24,7 +25,7 @@ from .arguments import Material, WritingArguments, byte_count, named_as_typed, o
 from .checks import check_output
 from .compress import compact_one, compress_one, fitted, trained
 from .parser import add_command
-from .rows import clamped_text, fact_rows
+from .rows import changed_rows, fact_rows
 
 MOSTLY = 0.5
 
@@ -40,6 +41,9 @@ class ConvertArguments(WritingArguments):
         metavar="BYTES",
         read=byte_count,
         help="compress by the preset compact, into at most that size as .smrl, like 8kB; for an OUT that is compressed",
+    )
+    reciprocal: bool = option(
+        default=False, help="the mean of both orders of the directions, as tables hold it in any case"
     )
     spectral: bool = option(default=False, help=".bsdf: spectra for pbrt-v4 and Mitsuba's spectral variants, not RGB")
     noise: int | None = option(
@@ -60,23 +64,27 @@ def convert(options: ConvertArguments) -> dict[str, Any]:
     kind = _checked(options)
     brdf = load(options.input) if options.noise is None else builtin_table(options.input, noise=options.noise)
     output: Path = options.output
+    kept = reciprocal(brdf) if options.reciprocal else brdf
     report = {} if kind.names_source else _report(brdf, output)
     if report.get("coverage", 1) < MOSTLY:
         console.warn(f"{options.input}: most of this material is extrapolated")
     if kind is smrl.FORMAT and options.target_size is not None:
-        result = compact_one(options.input, brdf, output, _compact(options), options.json)
+        result = compact_one(
+            options.input, brdf, output, _compact(options), options.json, reciprocal=options.reciprocal
+        )
     elif kind is smrl.FORMAT and not isinstance(brdf, SomManBrdf):
-        result = compress_one(options.input, BrdfTable.of(brdf), output, TrainOptions(), options.json)
+        result = compress_one(options.input, kept, output, TrainOptions(), options.json)
     else:
-        written = _write(brdf, kind, options)
+        written = _write(kept, kind, options)
         size = output.stat().st_size if output.is_file() else None  # of what went through a pipe
         counts = Counts() if kind.names_source else written.counts
         result = {"input": options.input, "name": written.name, "output": str(output), "bytes_disk": size}
         result |= asdict(counts)
         if not options.json:
-            told = f", cells clamped to 0: {clamped_text(counts)}" if counts.cells_clamped else ""
             written_as = "through a pipe" if size is None else console.size(size)
-            console.say(f"{written.name} → {output} ({written_as}{told})")
+            console.say(f"{written.name} → {output} ({written_as})")
+            for name, value in changed_rows(counts).items():
+                console.say(f"  {name}: {value}")
     if not options.json:
         _print_report(report | {"facts": {}} if "epochs" in result else report)
     return answers.of_materials([result | report])
@@ -98,6 +106,8 @@ def _checked(options: ConvertArguments) -> Format:
         raise OptionError(f"--spectral: expected an output that ends in .bsdf, found {options.output}")
     if kind and kind.names_source and options.noise is not None:
         raise OptionError("--noise: expected an output that holds the material, found a scene snippet")
+    if options.reciprocal and kind and kind.names_source:
+        raise OptionError("--reciprocal: expected an output that holds the material, found a scene snippet")
     if options.target_size is not None:
         _compact(options)
         if not (kind and kind.compressed):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from . import answers, console
 from .arguments import Material, WritingArguments, library_options, option, positional
 from .checks import check_output
 from .parser import add_command
-from .rows import fact_rows, origin_rows, text
+from .rows import changed_rows, fact_rows, origin_rows, text
 
 DEFAULTS = FactorOptions()
 
@@ -48,7 +48,7 @@ def factor(options: FactorArguments) -> dict[str, Any]:
         material = factored(brdf, chosen, progress=advance)
     seconds = time.perf_counter() - started
     written = fbrdf.save(material, options.output)
-    known = answers.described(options.material, material, written) | asdict(brdf.counts)
+    known = answers.described(options.material, material, written)
     if not options.json:
         rows = {
             "lobes × terms": text(known["terms"]),
@@ -56,7 +56,7 @@ def factor(options: FactorArguments) -> dict[str, Any]:
             "size on disk": console.size(written),
             **fact_rows(known["facts"]),
             **origin_rows(material),
-            **(fact_rows(asdict(brdf.counts)) if known["cells_clamped"] else {}),
+            **changed_rows(material.counts),
             "time": f"{seconds:.1f} s",
         }
         console.print_rows(f"{material.name} → {options.output}", rows)

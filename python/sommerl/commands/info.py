@@ -66,7 +66,7 @@ def _rows(known: Mapping[str, Any], brdf: Brdf) -> dict[str, str]:
     apart = (*HIDDEN, *COUNTS)
     shown = {key: value for key, value in known.items() if value not in (None, "", {}) and key not in apart}
     rows = {key: console.size(value) if key in SIZES else text(value) for key, value in shown.items()}
-    counted = {key: known[key] for key in COUNTS if known["cells_clamped"] is not None}
+    counted = {key: known[key] for key in COUNTS if known[key] is not None}
     rows |= fact_rows(counted | (known["facts"] or {})) | origin_rows(brdf)
     return rows | {f"lobe {number}": lobe_text(lobe) for number, lobe in enumerate(known["lobes"] or [], 1)}
 

@@ -22,6 +22,7 @@ from ..render.checkpoint import Checkpoint, checkpoint_of, content, content_of
 from ..render.compare import Comparison
 from ..render.frame import Image, Scene
 from ..render.images import DIFFERENCE_GAIN, signed_difference, write_image
+from ..render.judge import Judge
 from ..render.llvm import mitsuba
 from ..render.meshes import Mesh, load_mesh
 from ..render.metrics import exposure, flip_map, to_srgb8
@@ -38,7 +39,7 @@ from .inputs import expanded, labels, stem
 from .parser import add_command
 from .render_arguments import DEFAULT_SCENE, RenderArguments
 from .rendering import Sampling, check_environment, environment_of, goes_on_from
-from .rows import image_rows, table_rows
+from .rows import image_rows, judged_rows, table_rows
 
 MOST_PIXELS = 2**26  # of a sheet
 MOST_COMPARED = 2**23  # of one that is compared: the metrics take some 260 bytes for each
@@ -180,9 +181,10 @@ def _render(options: RenderArguments) -> dict[str, Any]:
         rows = image_rows(comparison.metrics)
         held = [pair for pair in pairs if pair.against is not None]
         if len(held) == 1:  # those of several materials would be no figure of any
-            tables = table_distance(*materials.both(held[0]))
-            result |= {f"table_{name}": value for name, value in tables.items()}
-            rows |= table_rows(tables)
+            both = materials.both(held[0])
+            judged, tables = Judge(both[0]).metrics(both[1]), table_distance(*both)
+            result |= judged | {f"table_{name}": value for name, value in tables.items()}
+            rows |= judged_rows(judged) | table_rows(tables)
     checkpoint.remove()
     if not options.json:
         rendered = ", ".join(one["label"] for one in shown[:3]) + (f" and {len(shown) - 3} more" if shown[3:] else "")

@@ -10,12 +10,13 @@ from ..reflectance import metric
 from ..reflectance.brdf import Brdf
 from ..reflectance.distance import TABLE_METRICS
 from ..reflectance.info import Counts
+from ..render.judge import JUDGED
 from ..render.metrics import METRICS
 
 
-def clamped_text(counts: Counts) -> str:
-    """What had to be set to 0 in a material's data, for people; "" if there is nothing to say."""
-    return f"{counts.cells_clamped} ({counts.energy_clamped:.2%} of the energy)" if counts.cells_clamped else ""
+def changed_rows(counts: Counts) -> dict[str, str]:
+    """What had to be changed in a material's data, for people; nothing of what was not."""
+    return fact_rows({name: value for name, value in asdict(counts).items() if value})
 
 
 def describe(brdf: Brdf, bytes_disk: int | None) -> dict[str, Any]:
@@ -43,9 +44,12 @@ def label(brdf: Brdf) -> str:
 FACTS = {
     "asymmetry": "asymmetry: |f(a, b) − f(b, a)| over the mean",
     "reciprocal": "both orders averaged",
+    "darkened": "by how much the mean of both orders was darkened at most, so as not to reflect too much",
+    "energy_negative": "share of the energy in negative channels",
     "cells_near_grazing": "MERL cells where a cosine below 0.01 was taken for 0.01",
-    "cells_clamped": "cells with a channel below 0 or not finite, set to 0",
-    "energy_clamped": "share of the energy in that",
+    "cells_clamped": "cells whose negative channels were removed, or that were not finite",
+    "energy_clamped": "share of the energy that this moved",
+    "energy_averaged": "share of the energy that averaging both orders moved",
     "samples_negative": "samples below 0 in a channel",
     "samples": "samples, at different directions",
     "samples_at_the_horizon": "samples at the horizon, left out",
@@ -85,3 +89,8 @@ def table_rows(metrics: Mapping[str, float]) -> dict[str, str]:
 def image_rows(metrics: Mapping[str, float]) -> dict[str, str]:
     """Distances between two renderings, by the keys of `metrics.METRICS`."""
     return metric.rows(METRICS, metrics)
+
+
+def judged_rows(metrics: Mapping[str, float]) -> dict[str, str]:
+    """Distances from a source, by the keys of `judge.JUDGED`."""
+    return metric.rows(JUDGED, metrics)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -65,7 +66,11 @@ class SomManBrdf(OnLattice):
     def counts(self) -> Counts:
         """Those of what was compressed, as far as the file keeps them."""
         facts = self.facts
-        return Counts(facts.get("cells_clamped"), facts.get("energy_clamped"))
+        return Counts(*(facts.get(each.name) for each in fields(Counts)))
+
+    @property
+    def signed(self) -> bool:
+        return self.palette.signed
 
     @property
     def domain(self) -> str:

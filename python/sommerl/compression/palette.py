@@ -31,6 +31,7 @@ class Palette(ABC):
 
     domain: ClassVar[Literal["linear", "cube-root"]]  #: in which entries are blended
     lut: NDArray[np.float64]
+    signed: bool = False  #: whether reflectances may be negative
 
     @property
     @abstractmethod
@@ -111,17 +112,19 @@ class GainsAndShapes(Palette):
     """The palette of the preset `compact`, for nodes: gain times shape is a value y in the cube-root domain.
 
     gains: (G,). lut: the shapes, (S, 3), whose mean is 1. scale: of the domain; see `nodes.from_cube_root`. signed:
-    whether blended values below 0 give negative reflectances, and not 0. index: unsigned, (2, nodes): of each node, the
-    number of its gain and of its shape.
+    whether blended values below 0 give negative reflectances, and not 0. smooth: see `nodes.damped`. index: unsigned,
+    (2, nodes): of each node, the number of its gain and of its shape.
     """
 
     domain = "cube-root"
 
-    def __init__(self, gains: ArrayLike, shapes: ArrayLike, scale: float, signed: bool = False) -> None:
+    def __init__(
+        self, gains: ArrayLike, shapes: ArrayLike, scale: float, signed: bool = False, smooth: bool = False
+    ) -> None:
         self.gains = np.array(gains, np.float64)
         self.lut = np.array(shapes, np.float64)
         self.scale = float(np.float32(scale))  # as a file holds it
-        self.signed = signed
+        self.signed, self.smooth = signed, smooth
 
     @property
     def entries(self) -> int:
@@ -157,13 +160,13 @@ class GainsAndShapes(Palette):
         return gain * r, gain * g, gain * b
 
     def reflectance(self, value: Triple, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
-        return from_cube_root(value, wi, wo, buffers["scale"], self.signed)
+        return from_cube_root(value, wi, wo, buffers["scale"], self.signed, self.smooth)
 
     def native(self, index: NDArray[Any], lattice: AnyLattice, interpolation: Interpolation) -> Native:
         gain, shape = index
         nodes = _nodes("palette", lattice)
         entries = self.gains, self.lut, gain, shape, self.scale
-        return _core.NodeLookup(*nodes.axes(), *entries, **nodes.folds, signed=self.signed)
+        return _core.NodeLookup(*nodes.axes(), *entries, **nodes.folds, signed=self.signed, smooth=self.smooth)
 
 
 def _check_lut(name: str, lut: NDArray[np.float64]) -> None:

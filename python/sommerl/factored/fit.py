@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..reflectance.brdf import Brdf
+from ..reflectance.gamut import without_negatives
 from ..reflectance.half_diff import spherical
+from ..reflectance.info import Counts
 from ..reflectance.origin import source_of
 from ..system.errors import OptionError
 from ..system.optional import optional
@@ -54,7 +56,7 @@ def factor(brdf: Brdf, options: FactorOptions | None = None, *, progress: Progre
     scikit-learn.
     """
     options = options or FactorOptions()
-    data, above = _light(brdf)
+    data, above, changed = _light(brdf)
     rows, columns = _scales(data)
     f, g = _nmf(data * rows * columns, options.lobes)
     f, g = f / rows, g / columns
@@ -66,13 +68,14 @@ def factor(brdf: Brdf, options: FactorOptions | None = None, *, progress: Progre
     by_lobe = np.moveaxis(f.reshape(ELEVATIONS, 3, -1), 1, 2)
     scale = tops[0][:, None] * tops[1] * tops[2]
     material = FactoredBrdf(by_lobe, u, v, scale, name=brdf.name)
-    material.source = source_of(brdf)
+    material.source, material.changed = source_of(brdf), changed
     return material
 
 
-def _light(brdf: Brdf) -> tuple[Matrix, NDArray[np.bool_]]:
-    """f_r max(cos θ_i, C) at the middles of all intervals, 0 where the light is below the horizon; and whether the
-    light is above it. Both have the shape (ELEVATIONS · 3, ROWS · COLUMNS)."""
+def _light(brdf: Brdf) -> tuple[Matrix, NDArray[np.bool_], Counts]:
+    """f_r max(cos θ_i, C) at the middles of all intervals, 0 where the light is below the horizon; whether the light is
+    above it; and what had to be changed since factors hold no negative colours. The first two have the shape
+    (ELEVATIONS · 3, ROWS · COLUMNS)."""
     theta_h = ((np.arange(ROWS) + 0.5) / ROWS) ** 2 * PI / 2
     phi_h = (np.arange(COLUMNS) + 0.5) / COLUMNS * PI
     theta_o = (np.arange(ELEVATIONS) + 0.5) / ELEVATIONS * PI / 2
@@ -80,9 +83,12 @@ def _light(brdf: Brdf) -> tuple[Matrix, NDArray[np.bool_]]:
     h = np.stack(spherical(theta_h, phi_h), axis=-1)
     wo = np.stack(spherical(theta_o, np.zeros_like(theta_o)), axis=-1)
     wi = 2 * (h * wo).sum(axis=-1, keepdims=True) * h - wo
-    values = brdf.eval(wi, wo) * np.maximum(wi[..., 2:], LEAST_COSINE)
+    given = brdf.eval(wi, wo) * np.maximum(wi[..., 2:], LEAST_COSINE)
+    values = without_negatives(given)
+    moved = np.abs(values - given).sum() / max(np.abs(given).sum(), TINY)
+    changed = Counts(int((values != given).any(axis=-1).sum()), float(moved))
     shape = 3 * ELEVATIONS, ROWS * COLUMNS
-    return np.moveaxis(values, -1, 1).reshape(shape), np.repeat(wi[..., 2] > 0, 3, axis=0).reshape(shape)
+    return np.moveaxis(values, -1, 1).reshape(shape), np.repeat(wi[..., 2] > 0, 3, axis=0).reshape(shape), changed
 
 
 def _scales(data: Matrix) -> tuple[Matrix, Matrix]:

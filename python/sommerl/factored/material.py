@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..reflectance.arrays import Array, Triple, gather3, ops
 from ..reflectance.brdf import Brdf, Buffers
 from ..reflectance.distance import asymmetry
+from ..reflectance.info import Counts
 from ..reflectance.origin import Source
 from ..system.errors import MaterialError
 
@@ -37,7 +38,7 @@ class FactoredBrdf(Brdf):
     lobes: F, shape (ELEVATIONS, J, 3). rows: u, (ROWS, J, K). columns: v, (COLUMNS, J, K). All are from 0 to 1, and
         kept in half precision, as a file holds them. A value belongs to the middle of its interval; between middles
         they are interpolated linearly.
-    scale: a factor for each term [1/sr], (J, K).
+    scale: a factor for each term [1/sr], (J, K). changed: in the source, of what was just factored; no file keeps it.
     """
 
     kind = "factored"
@@ -65,13 +66,21 @@ class FactoredBrdf(Brdf):
             raise MaterialError(f"factors: expected at most {MOST} × {MOST} and {MOST_TERMS} terms, found {terms}")
         if not ((scale >= 0) & (scale <= LARGEST_SCALE)).all():
             raise MaterialError(f"factors: expected scales from 0 to {LARGEST_SCALE:g}, found others")
-        self.name, self.source = name, Source(source_sha256)
+        self.name, self.source, self.changed = name, Source(source_sha256), Counts()
         self.lobes, self.rows, self.columns = (part.astype(np.float16) for part in (lobes, rows, columns))
         self.scale = scale.astype(np.float32)
 
     @property
     def reciprocal(self) -> bool:
         return False
+
+    @property
+    def mirrored(self) -> bool:
+        return True
+
+    @property
+    def counts(self) -> Counts:
+        return self.changed
 
     @property
     def terms(self) -> tuple[int, int]:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..reflectance.brdf import Brdf
+from ..reflectance.gamut import without_negatives
 from ..reflectance.half_diff import directions
 from ..reflectance.samples import Samples
 from ..system.errors import MaterialError
@@ -16,17 +17,18 @@ DIAMETER = 230  # of the sphere in pixels: nine tenths of a picture of 256 pixel
 
 
 def samples_of(brdf: Brdf, options: FitOptions) -> Samples:
-    """The samples of a material in the directions that the options ask for.
+    """The samples of a material in the directions that the options ask for, as a model can hold them
+    (`gamut.without_negatives`).
 
-    Raises MaterialError if a value is negative or not finite, if all are 0, or if the largest is not from DARKEST to
+    Raises MaterialError if a value is not finite, if all are 0, or if the largest is not from DARKEST to
     BRIGHTEST.
     """
     wi, wo = sphere(options.samples, options.seed) if options.sampling == "sphere" else lattice(brdf)
-    f_r = brdf.eval(wi, wo)
-    unusable = int((~(np.isfinite(f_r) & (f_r >= 0))).any(axis=-1).sum())
+    f_r = without_negatives(brdf.eval(wi, wo))
+    unusable = int((~np.isfinite(f_r)).any(axis=-1).sum())
     if unusable:
         raise MaterialError(
-            f"{brdf.name}: no model can be fitted to it, since its reflectance is negative or not finite in "
+            f"{brdf.name}: no model can be fitted to it, since its reflectance is not finite in "
             f"{unusable} of {len(wi)} directions"
         )
     if not f_r.any():

@@ -10,23 +10,18 @@ vectors, and the reflectance times cosine, relative to that density, on a grid o
 from __future__ import annotations
 
 import hashlib
-from copy import copy
-from dataclasses import asdict
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..reflectance.arrays import Array, Triple, ops
+from ..reflectance.arrays import Array, Triple, gather3, ops
 from ..reflectance.brdf import Brdf, Buffers
 from ..reflectance.cells import MERL
-from ..reflectance.distance import asymmetry
-from ..reflectance.half_diff import TWO_PI, directions
-from ..reflectance.info import Counts
+from ..reflectance.distance import asymmetry, negative_share
+from ..reflectance.half_diff import TWO_PI, directions, spherical
 from ..reflectance.origin import Source
-from ..reflectance.table import BrdfTable
 from ..system import door
 from ..system.errors import FormatError
 from ..system.visible import visible
@@ -39,6 +34,9 @@ MOST_ANGLES = 1024
 MOST_WAVELENGTHS = 4096
 LARGEST = 1e30  # renderers calculate in single precision
 SMALLEST_COSINE = 0.01  # that a stored f_r cos θ_o is divided by
+NORMAL = 1e-14  # viewers with a smaller sin² θ are at the normal, and have no azimuth
+NORMAL_POINTS, AZIMUTHS = 512, 64  # lights for which the reflectance to the normal is tabulated, and averaged
+NORMAL_END = 2**0.5  # 1 / u_θ of the half vector between the normal and the horizon
 
 
 class RglBrdf(Brdf):
@@ -46,11 +44,14 @@ class RglBrdf(Brdf):
 
     theta_i: (n,) incident elevations [rad]. vndf: (n, h, w), the density of visible normals over (u_φ, u_θ) in
     [0, 1]². rgb: (n, 3, k, k), linear. ndf, sigma: (·, ·) over (u_φ, u_θ). jacobian: whether `rgb` is relative to
-    D / 4σ. reciprocal: f_r is the mean of both orders of the directions; otherwise the raw data, with the file's
-    incident direction as `wo`, the direction that a renderer comes from (Mitsuba and pbrt-v4 read the files so).
+    D / 4σ.
 
-    cos θ_o is at least SMALLEST_COSINE where data is divided by it: beyond, at 89.4°, measurements hold noise that
-    the division would turn into peaks without bound.
+    f_r is what the file holds: signed, and one-sided, with the file's incident direction as `wo`, the direction that a
+    renderer comes from (Mitsuba and pbrt-v4 read the files so). `reflectance.reciprocal` averages both orders.
+
+    The cosine that data is divided by is taken for at least SMALLEST_COSINE: beyond, at 89.4°, measurements hold noise
+    that the division would turn into peaks without bound. A viewer exactly at the normal has no azimuth, on which the
+    file's data depends even there: it sees the mean over all azimuths.
     """
 
     kind = "measurement"
@@ -64,12 +65,10 @@ class RglBrdf(Brdf):
         sigma: NDArray[Any],
         *,
         jacobian: bool = True,
-        reciprocal: bool = True,
         name: str = "rgl",
         source_sha256: str = "",
     ) -> None:
         self.name = name
-        self._reciprocal, self._clamped = reciprocal, reciprocal
         self.source = Source(source_sha256)
         self._theta_i = np.asarray(theta_i, np.float64)
         self._shapes = {"vndf": vndf.shape[1:], "rgb": rgb.shape[2:], "ndf": ndf.shape, "sigma": sigma.shape}
@@ -84,58 +83,61 @@ class RglBrdf(Brdf):
             "sigma": np.asarray(sigma, np.float64).reshape(-1),
             "theta_i": self._theta_i,
         }
+        self._buffers["at_normal"] = self._mean_at_normal().reshape(-1)
 
     @property
     def reciprocal(self) -> bool:
-        return self._reciprocal
+        return False
+
+    @property
+    def signed(self) -> bool:
+        return bool((self._buffers["rgb"] < 0).any())
 
     @property
     def lookup(self) -> str:
         return "measurement"
 
     @property
-    def counts(self) -> Counts:
-        """Of MERL's cells, those that the mean of both orders sets to 0, and the share of their energy."""
-        return self._cut
+    def facts(self) -> dict[str, Any]:
+        """How far from reciprocal the measurement is (`distance.asymmetry`); the share of its energy that is negative
+        (`distance.negative_share`); and how many of MERL's cells that are not 0 the bound on the cosine makes smaller.
+        """
+        cos_i, _ = MERL.cosines()
+        near = MERL.above_horizon & (cos_i < SMALLEST_COSINE)
+        touched = np.any(self.f_r(*directions(*(angle[near] for angle in MERL.angles())), self._buffers), axis=0)
+        one_sided, negative = asymmetry(self._here), negative_share(self._here)
+        return {"asymmetry": one_sided, "energy_negative": negative, "cells_near_grazing": int(touched.sum())}
+
+    def _here(self, wi: Triple, wo: Triple) -> Triple:
+        return self.f_r(wi, wo, self._buffers)
 
     def buffers(self) -> dict[str, NDArray[Any]]:
         return self._buffers
 
-    def unclamped(self) -> RglBrdf:
-        """The same with the file's negative numbers, also in the mean of both orders."""
-        other = copy(self)
-        other._clamped = False
-        return other
-
-    @cached_property
-    def _cut(self) -> Counts:
-        if not (self._clamped and (self._buffers["rgb"] < 0).any()):
-            return Counts(0, 0.0)
-        return BrdfTable.sampled(self).counts
-
-    @property
-    def facts(self) -> dict[str, Any]:
-        """How far from reciprocal the measurement is; how many of MERL's cells that are not 0 the bound on cosines
-        makes smaller; how many have a channel that is negative and taken for 0, and its share of the energy.
-
-        asymmetry: see `distance.asymmetry`.
-        """
-        one_sided = asymmetry(lambda wi, wo: self._raw(wi, wo, self._buffers))
-        cos_i, cos_o = MERL.cosines()
-        divided = np.minimum(cos_i, cos_o) if self.reciprocal else cos_i
-        near = MERL.above_horizon & (divided < SMALLEST_COSINE)
-        touched = np.any(self.f_r(*directions(*(angle[near] for angle in MERL.angles())), self._buffers), axis=0)
-        known = {"reciprocal": self.reciprocal, "asymmetry": one_sided, "cells_near_grazing": int(touched.sum())}
-        return known | asdict(self._cut)
-
     def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
-        forward = self._raw(wo, wi, buffers)
-        if not self.reciprocal:
-            return forward
         f = ops(wi[0])
-        backward = self._raw(wi, wo, buffers)
-        r, g, b = ((x + y) * 0.5 for x, y in zip(forward, backward, strict=True))
-        return (f.maximum(r, 0.0), f.maximum(g, 0.0), f.maximum(b, 0.0)) if self._clamped else (r, g, b)
+        upright = wo[0] * wo[0] + wo[1] * wo[1] < NORMAL
+        around, mean = self._raw(wo, wi, buffers), self._at_normal(wi, buffers)
+        r, g, b = (f.where(upright, y, x) for x, y in zip(around, mean, strict=True))
+        return r, g, b
+
+    def _at_normal(self, wi: Triple, buffers: Buffers) -> Triple:
+        """f_r for a viewer at the normal, interpolated between lights at equal steps of u_θ of the half vector."""
+        f = ops(wi[0])
+        theta = f.atan2(f.sqrt(wi[0] * wi[0] + wi[1] * wi[1]), wi[2])
+        i, t = _cell(f, _unit(f, 0.5 * theta) * NORMAL_END, NORMAL_POINTS)
+        here, next_ = (gather3(buffers["at_normal"], number) for number in (i, i + 1))
+        r, g, b = (a + t * (c - a) for a, c in zip(here, next_, strict=True))
+        factor = 1.0 / f.maximum(wi[2], SMALLEST_COSINE)
+        return r * factor, g * factor, b * factor
+
+    def _mean_at_normal(self) -> NDArray[np.float64]:
+        """f_r cos θ_i for a viewer at the normal, the mean over azimuths; (NORMAL_POINTS, 3)."""
+        u = np.arange(NORMAL_POINTS) / (NORMAL_POINTS - 1) / NORMAL_END
+        theta_h, phi = np.meshgrid(u * u * (TWO_PI / 4), (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS * TWO_PI, indexing="ij")
+        light, viewer = spherical(2 * theta_h, phi), spherical(np.full_like(phi, 1e-9), np.zeros_like(phi))
+        cosine = np.maximum(light[2], SMALLEST_COSINE)
+        return np.stack([(c * cosine).mean(axis=1) for c in self._raw(viewer, light, self._buffers)], axis=-1)
 
     def _raw(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
         """f_r with `wi` as the file's incident direction."""
@@ -204,15 +206,15 @@ def looks_like(head: bytes) -> bool:
     return head.startswith(tensor.MAGIC)
 
 
-def read(path: str | Path, *, reciprocal: bool = True) -> RglBrdf:
+def read(path: str | Path) -> RglBrdf:
     """The material in an RGL file. Raises FormatError if it is not one, or is anisotropic.
 
-    A spectral file is converted to linear sRGB. reciprocal: see `RglBrdf`.
+    A spectral file is converted to linear sRGB.
     """
-    return parse(Path(path), door.read(path, tensor.LARGEST_FILE), reciprocal=reciprocal)
+    return parse(Path(path), door.read(path, tensor.LARGEST_FILE))
 
 
-def parse(path: Path, data: bytes, *, reciprocal: bool = True) -> RglBrdf:
+def parse(path: Path, data: bytes) -> RglBrdf:
     """As `read`, from the file's bytes; the path is for names and messages alone."""
     file = tensor.TensorFile(path, data)
     colours = "rgb" if "rgb" in file.fields else "spectra"
@@ -242,7 +244,6 @@ def parse(path: Path, data: bytes, *, reciprocal: bool = True) -> RglBrdf:
         ndf,
         sigma,
         jacobian=bool(file.array("jacobian")[0]),
-        reciprocal=reciprocal,
         name=visible(path.stem),
         source_sha256=hashlib.sha256(data).hexdigest(),
     )

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..reflectance.brdf import Brdf
+from ..reflectance.gamut import LUMINANCE
 from ..reflectance.half_diff import directions, spherical
 from ..system.errors import MaterialError
 from ..system.files import atomic_write
@@ -21,7 +22,6 @@ from . import tensor
 from .rgl import cumulated
 from .spectra import srgb_weights
 
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 ELEVATIONS = 48  # incident angles
 STEEPEST = np.radians(89.5)
 NORMALS = (32, 192)  # points of the densities of normals, in φ and in θ

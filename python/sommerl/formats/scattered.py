@@ -17,8 +17,9 @@ from ..reflectance.brdf import LARGEST
 from ..reflectance.cells import MERL, Lattice
 from ..reflectance.distance import LOG_FLOOR, energy_share
 from ..reflectance.half_diff import directions, half_diff
+from ..reflectance.info import Counts
 from ..reflectance.samples import Samples
-from ..reflectance.table import BrdfTable
+from ..reflectance.table import BrdfTable, representable
 from ..system.errors import FormatError, MaterialError
 from ..system.interrupt import hold_interrupts
 from ..system.optional import optional
@@ -38,17 +39,23 @@ MOST_SAMPLES = 2_000_000
 
 
 class ScatteredTable(BrdfTable):
-    """A table made from `samples`. measured: whether one lies near each cell, of the lattice's shape."""
+    """A table made from `samples`. measured: whether one lies near each cell, of the lattice's shape. changed: in
+    values that were fitted to the samples, before the table was interpolated from these."""
 
     measured: NDArray[np.bool_]
     samples: Samples
+    changed: Counts
+
+    @property
+    def counts(self) -> Counts:
+        return self.changed
 
 
 def to_table(samples: Samples, *, name: str, source_sha256: str | None = None, lattice: Lattice = MERL) -> BrdfTable:
     """The table that is fitted to samples. Those at the horizon itself, where nothing can be measured, are left out.
 
-    A fitted plane may be negative, where samples are or between them. Such values are set to 0, and `cells_clamped`
-    counts the table's cells that are interpolated from one.
+    A fitted plane may be negative, where samples are or between them. Such values are changed as `BrdfTable` does, and
+    `cells_clamped` counts the table's cells that are interpolated from one.
 
     Its facts: samples, those at different directions; samples_at_the_horizon, those left out; samples_negative, those
     with a channel below 0, which the planes are fitted to as they are; mirrored, whether they
@@ -80,12 +87,12 @@ def to_table(samples: Samples, *, name: str, source_sha256: str | None = None, l
     values = np.zeros((*coarse.shape, 3))
     values[above] = _regression(both, wi, wo)
     try:
-        fitted = BrdfTable(np.maximum(values, 0.0), coarse, name=name)
+        fitted = BrdfTable(representable(values)[0], coarse, name=name)
     except MaterialError as error:
         raise FormatError("expected a positive reflectance in some sample, found none") from error
     fine = BrdfTable.sampled(fitted, lattice)
     table = ScatteredTable(fine.values, lattice, name=name, source_sha256=source_sha256)
-    table.cells_clamped, table.energy_clamped = _clamped(coarse, values, table)
+    table.changed = _changed(coarse, values, table)
     near = np.zeros(coarse.shape, bool)
     near[above] = _near(both, wi, wo)
     table.samples = samples
@@ -103,20 +110,20 @@ def to_table(samples: Samples, *, name: str, source_sha256: str | None = None, l
     return table
 
 
-def _clamped(coarse: Lattice, values: NDArray[np.float64], table: BrdfTable) -> tuple[int, float]:
-    """How many cells of a table above the horizon are interpolated from values, of a coarse lattice, that had to be set
-    to 0; and the share of the energy that these held."""
+def _changed(coarse: Lattice, values: NDArray[np.float64], table: BrdfTable) -> Counts:
+    """How many cells of a table above the horizon are interpolated from values, of a coarse lattice, that no table can
+    hold; and the share of the energy by which these were changed."""
     values = coarse.extended(values)
-    changed = ~((values >= 0) & (values <= LARGEST))
+    held, changed = representable(values)
     if not changed.any():
-        return 0, 0.0
-    size = np.where(changed & np.isfinite(values), np.minimum(np.abs(values), LARGEST), 0.0)
-    touched, lost = (
+        return Counts(0, 0.0, 0.0)
+    size = np.minimum(np.abs(np.where(np.isfinite(values), values - held, 0.0)), LARGEST)
+    touched, moved = (
         BrdfTable.sampled(BrdfTable(each, coarse), table.lattice).values if each.any() else np.zeros_like(table.values)
-        for each in (changed.astype(np.float64), size)
+        for each in (np.repeat(changed[..., None], 3, axis=-1).astype(np.float64), size)
     )
     cells = (touched > 0).any(axis=-1) & table.lattice.above_horizon
-    return int(cells.sum()), energy_share(lost, table.values + lost, table.lattice)
+    return Counts(int(cells.sum()), energy_share(moved, table.values + moved, table.lattice), 0.0)
 
 
 def _merged(samples: Samples) -> Samples:

@@ -40,10 +40,9 @@ def builtin_table(name: str, *, noise: int | None = None, lattice: Lattice = MER
     """A built-in material as a table: its formula at the cell centres of a lattice.
 
     noise: None for no noise, or a seed. The noise has the size that the paper quotes for MERL's measurements
-    (deviations
-        from reciprocity of 10-15 % near normal incidence and 60-70 % at grazing angles). Each cell is multiplied by a
-        log-normal factor, the same for all channels, with mean 1 and σ = 0.12 + 0.5 (1 - cos θ)⁴, where θ is the larger
-        of θ_i and θ_o.
+    (deviations from reciprocity of 10-15 % near normal incidence and 60-70 % at grazing angles). Each cell is
+    multiplied by a log-normal factor, the same for all channels, with mean 1 and σ = 0.12 + 0.5 (1 - cos θ)⁴, where θ
+    is the larger of θ_i and θ_o.
     """
     table = BrdfTable.sampled(builtin(name), lattice)
     if noise is None:

@@ -105,6 +105,10 @@ class MultiLobe(Brdf):
     def details(self) -> dict[str, Any]:
         return {"lobes": [lobe.as_json() for lobe in self.lobes]}
 
+    @property
+    def mirrored(self) -> bool:
+        return True
+
     def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
         angles, parameters, gather = Angles(wi, wo), buffers["parameters"], ops(wi[0]).gather
         total, start = [0.0, 0.0, 0.0], 0

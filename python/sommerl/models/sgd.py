@@ -27,6 +27,10 @@ class ShiftedGamma(Brdf):
         self.name = name
         self._channels = [{key: parameters[key][channel] for key in PARAMETERS} for channel in range(3)]
 
+    @property
+    def mirrored(self) -> bool:
+        return True
+
     def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
         seen = Angles.of(wi, wo)
         r, g, b = (channel(q, seen) for q in self._channels)

@@ -35,7 +35,8 @@ class Tone:
         return cls(base, max(white, HEADROOM * base))
 
     def linear(self, f_r: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Linear RGB in [0, 1] for f_r of shape (..., 3)."""
+        """Linear RGB in [0, 1] for f_r of shape (..., 3); negative channels are shown as 0."""
+        f_r = np.maximum(f_r, 0.0)
         brightest = f_r.max(axis=-1, keepdims=True)
         shown = np.minimum(np.log1p(brightest / self.base) / np.log1p(self.white / self.base), 1.0)
         return f_r * shown / np.where(brightest > 0, brightest, 1.0)

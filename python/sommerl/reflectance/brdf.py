@@ -61,6 +61,16 @@ class Brdf(ABC):
         return True
 
     @property
+    def signed(self) -> bool:
+        """Whether a channel may be negative, as in measurements of saturated or dark colours."""
+        return False
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether light from both sides of the viewer's plane gives the same by construction; data may do so, too."""
+        return False
+
+    @property
     def lookup(self) -> str:
         """How a value is found: "formula", "factored", "measurement", or how a table is interpolated."""
         return "formula"
@@ -86,6 +96,9 @@ class Brdf(ABC):
         return Info(
             kind=self.kind,
             name=self.name,
+            reciprocal=self.reciprocal,
+            signed=self.signed,
+            mirrored=self.mirrored,
             bytes_memory=self.bytes_memory,
             source_sha256=self.source.sha256 or None,
             **asdict(self.counts),
@@ -104,11 +117,6 @@ class Brdf(ABC):
         raise MaterialError(
             f"{self.name}: expected a table or a compressed material to interpolate, found another ({self.lookup})"
         )
-
-    def unclamped(self) -> Brdf:
-        """The same before anything was set to 0 that no material reflects, as negative numbers of measurements: itself,
-        unless the class says otherwise."""
-        return self
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name!r})"
@@ -144,11 +152,6 @@ class Brdf(ABC):
         if values:
             result[above] = finite(np.concatenate(values))
         return result
-
-    def eval_both_orders(self, wi: ArrayLike, wo: ArrayLike) -> Vectors:
-        """The mean of f_r for both orders of the directions: what a reciprocal representation can hold of it."""
-        f_r = self.eval(wi, wo)
-        return f_r if self.reciprocal else 0.5 * (f_r + self.eval(wo, wi))
 
     def sample(self, wo: ArrayLike, u: ArrayLike) -> tuple[Vectors, Vectors, Vectors]:
         """Draws directions to the light `wi`, likelier where the BRDF reflects more.
@@ -201,6 +204,10 @@ class OnLattice(Brdf):
     @property
     def reciprocal(self) -> bool:
         return self.lattice.reciprocal
+
+    @property
+    def mirrored(self) -> bool:
+        return self.lattice.mirrored
 
     @property
     def lookup(self) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ LOG_FLOOR = 1e-3  # [1/sr]: reflectances well below it count as black in the log
 QUADRATURE = Lattice(45, 30, 36)  # of the asymmetry
 
 Values = NDArray[np.float64]
+FormulaOfBuffers = Callable[[Triple, Triple, Mapping[str, Any]], Triple]  #: as `Brdf.f_r`
 
 
 def table_metrics(reference: Values, candidate: Values, lattice: Lattice) -> dict[str, float]:
@@ -83,7 +85,39 @@ def asymmetry(f_r: Callable[[Triple, Triple], Triple]) -> float:
     """How far from reciprocal a BRDF is: ∬ |f(a, b) − f(b, a)| cos cos dω dω over the same integral of their mean,
     channels added. 0 for a reciprocal one, and for a black one.
     """
-    weight = (QUADRATURE.solid_angles() * np.prod(QUADRATURE.cosines(), axis=0))[QUADRATURE.above_horizon]
-    wi, wo = directions(*(angle[QUADRATURE.above_horizon] for angle in QUADRATURE.angles()))
+    wi, wo, weight = _quadrature()
     one, other = np.sum(f_r(wi, wo), axis=0), np.sum(f_r(wo, wi), axis=0)
     return float((weight * abs(one - other)).sum() / max((weight * (one + other) / 2).sum(), 1e-300))
+
+
+def sidedness(f_r: Callable[[Triple, Triple], Triple]) -> float:
+    """How far a BRDF is from giving the same for light from both sides of the viewer's plane: as `asymmetry`, with both
+    directions reflected in a plane through the normal instead of swapped.
+    """
+    wi, wo, weight = _quadrature()
+    one, other = np.stack(f_r(wi, wo)), np.stack(f_r(*((x, -y, z) for x, y, z in (wi, wo))))
+    return float((weight * abs(one - other)).sum() / max((weight * abs(one + other) / 2).sum(), 1e-300))
+
+
+def negative_share(f_r: Callable[[Triple, Triple], Triple]) -> float:
+    """The share of a BRDF's energy in channels that are negative: ∬ max(0, −f) cos cos dω dω over the same integral of
+    |f|, channels added. 0 for a black one.
+    """
+    wi, wo, weight = _quadrature()
+    values = np.stack(f_r(wi, wo))
+    return float((weight * np.maximum(-values, 0.0)).sum() / max((weight * abs(values)).sum(), 1e-300))
+
+
+def moved_share(before: FormulaOfBuffers, after: FormulaOfBuffers, buffers: Mapping[str, Any]) -> float:
+    """How much energy a change of a BRDF moved: ∬ |after − before| cos cos dω dω over the same integral of |before|,
+    channels added. 0 if it was black. buffers: what both read from.
+    """
+    wi, wo, weight = _quadrature()
+    first, second = (np.stack(f_r(wi, wo, buffers)) for f_r in (before, after))
+    return float((weight * abs(second - first)).sum() / max((weight * abs(first)).sum(), 1e-300))
+
+
+def _quadrature() -> tuple[Triple, Triple, Values]:
+    """Pairs of directions above the horizon, and their solid angles times cosines."""
+    weight = (QUADRATURE.solid_angles() * np.prod(QUADRATURE.cosines(), axis=0))[QUADRATURE.above_horizon]
+    return *directions(*(angle[QUADRATURE.above_horizon] for angle in QUADRATURE.angles())), weight

@@ -29,6 +29,7 @@ class AnyLattice(ABC):
 
     interpolations: ClassVar[tuple[Interpolation, ...]]  #: those that it has, the usual one first
     reciprocal: bool  #: whether a pair of directions asks for the same in both orders
+    mirrored: bool = False  #: whether light from both sides of the viewer's plane asks for the same
 
     @property
     @abstractmethod

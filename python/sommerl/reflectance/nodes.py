@@ -25,6 +25,7 @@ from .lattice import AnyLattice, Interpolation
 FINE = 180  # steps of each axis
 KNEE, BELOW, ABOVE = 90, 360, 120  # steps of √(θ_h / 90°) are 1/BELOW up to number KNEE, 1/ABOVE from there
 SMALLEST_COSINE = 0.01
+HORIZON = 0.0009  # added to squares of cosines
 HALF_PI = TWO_PI / 4
 
 
@@ -148,16 +149,24 @@ def angles_at(x: Array, y: Array, z: Array, reciprocal: bool = True, mirrored: b
     return a * a * HALF_PI, y * (HALF_PI / FINE), z * (phi_d_range(reciprocal, mirrored) / FINE)
 
 
-def damped(wi: Triple, wo: Triple) -> Array:
-    """cos θ_i cos θ_o, neither taken for less than SMALLEST_COSINE: f_r times this stays small near grazing."""
+def damped(wi: Triple, wo: Triple, smooth: bool = False) -> Array:
+    """cos θ_i cos θ_o, bounded from below: f_r times this stays small near grazing. Each cosine is taken for
+    √(cos² θ + 0.03²) if smooth, else for at least SMALLEST_COSINE.
+
+    Errors of a blended value are divided by it: the former ends without a kink, and enlarges them less.
+    """
     f = ops(wi[0])
+    if smooth:
+        return f.sqrt((wi[2] * wi[2] + HORIZON) * (wo[2] * wo[2] + HORIZON))
     return f.maximum(wi[2], SMALLEST_COSINE) * f.maximum(wo[2], SMALLEST_COSINE)
 
 
-def from_cube_root(y: Triple, wi: Triple, wo: Triple, scale: Array, signed: bool = False) -> Triple:
+def from_cube_root(
+    y: Triple, wi: Triple, wo: Triple, scale: Array, signed: bool = False, smooth: bool = False
+) -> Triple:
     """f_r of values y in the cube-root domain: scale · max(0, y)³ / `damped`, or scale · y³ / `damped` if signed."""
     f = ops(wi[0])
-    factor = scale / damped(wi, wo)
+    factor = scale / damped(wi, wo, smooth)
 
     def channel(value: Array) -> Array:
         root = value if signed else f.maximum(value, 0.0)

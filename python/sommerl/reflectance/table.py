@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -16,19 +17,22 @@ from .arrays import Triple, gather3
 from .brdf import LARGEST, Brdf, Buffers, Native, OnLattice
 from .cells import MERL, Lattice
 from .distance import energy_share
+from .gamut import without_negatives
 from .half_diff import directions
 from .info import Counts
 from .lattice import Interpolation
 from .origin import Source, source_of
+from .reciprocal import reciprocal
 
 
 class BrdfTable(OnLattice):
     """A measured or sampled isotropic BRDF.
 
-    values: f_r [1/sr], linear RGB, float64, of shape `lattice.shape + (3,)`. Above the horizon, negative and
-        non-finite values of the input become 0 and are counted in `cells_clamped`; cells below the horizon,
-        which hold no measurement, continue the last cell above it (`Lattice.extended`). `energy_clamped` is the share
-        of the energy that they held (`distance.energy_share`), as finite numbers without their sign.
+    values: f_r [1/sr], linear RGB, float64, of shape `lattice.shape + (3,)`. A table holds no negative numbers: above
+        the horizon, colours of the input with a negative channel are moved to where there is none
+        (`gamut.without_negatives`), and values that are not finite become 0; `cells_clamped` counts the cells, and
+        `energy_clamped` is the share of the energy that was moved (`distance.energy_share`). Cells below the horizon,
+        which hold no measurement, continue the last cell above it (`Lattice.extended`).
     interpolation: "trilinear", or "nearest" as in the paper.
     source_sha256: of the file that the table was read from; of the values where there is none.
 
@@ -51,34 +55,31 @@ class BrdfTable(OnLattice):
         f_r = np.asarray(values, np.float64)
         if f_r.shape != (*lattice.shape, 3):
             raise MaterialError(f"expected values of shape {(*lattice.shape, 3)}, found {f_r.shape}")
-        self.values: NDArray[np.float64] = lattice.extended(f_r)
-        # Not true, either, of NaN. Renderers calculate in single precision.
-        unusable = ~((self.values >= 0) & (self.values <= LARGEST))
-        share = energy_share(np.where(unusable, self.values, 0.0), self.values, lattice) if unusable.any() else 0.0
-        self.values[unusable] = 0.0
+        given = lattice.extended(f_r)
+        self.values, changed = representable(given)
+        share = energy_share(_difference(given, self.values), given, lattice) if changed.any() else 0.0
         if not (self.values > 0).any():
             raise MaterialError("expected a positive, finite reflectance above the horizon, found none")
         self.name = name
         self.lattice = lattice  # pyright: ignore[reportIncompatibleVariableOverride] # narrower, and never assigned
         self.interpolation: Interpolation = lattice.checked(name, interpolation)
-        self.cells_clamped = int(unusable[lattice.above_horizon].any(axis=-1).sum())
-        self.energy_clamped = share
+        self._counts = Counts(int(changed[lattice.above_horizon].sum()), share, 0.0)
         self.source = Source(source_sha256 or hashlib.sha256(self.values.astype("<f8").tobytes()).hexdigest())
 
     @classmethod
     def sampled(cls, brdf: Brdf, lattice: Lattice = MERL) -> BrdfTable:
         """The table of a BRDF's values at the cell centres above the horizon.
 
-        On a reciprocal lattice, the mean of both orders of the directions. What the BRDF itself sets to 0 is counted,
-        too (`Brdf.unclamped`).
+        On a reciprocal lattice, those of `reciprocal(brdf)`; the table's counts say how much that changed.
         """
         above = lattice.above_horizon
         wi, wo = directions(*(angle[above] for angle in lattice.angles()))
         values = np.zeros((*lattice.shape, 3))
-        source = brdf.unclamped()
-        found = source.eval_both_orders if lattice.reciprocal else source.eval
-        values[above] = found(np.stack(wi, -1), np.stack(wo, -1))
-        return cls(values, lattice, name=brdf.name)
+        source = reciprocal(brdf) if lattice.reciprocal else brdf
+        values[above] = source.eval(np.stack(wi, -1), np.stack(wo, -1))
+        table = cls(values, lattice, name=brdf.name)
+        table._counts = replace(table.counts, energy_averaged=source.counts.energy_averaged or 0.0)
+        return table
 
     @classmethod
     def of(cls, brdf: Brdf) -> BrdfTable:
@@ -97,7 +98,7 @@ class BrdfTable(OnLattice):
 
     @property
     def counts(self) -> Counts:
-        return Counts(self.cells_clamped, self.energy_clamped)
+        return self._counts
 
     @property
     def grid(self) -> Lattice:
@@ -115,3 +116,19 @@ class BrdfTable(OnLattice):
     def native(self) -> Native:
         trilinear = self.interpolation == "trilinear"
         return _core.CellLookup(self.lattice.shape, self.lattice.reciprocal, trilinear, self.values.reshape(-1))
+
+
+def representable(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Values (..., 3) as a table can hold them, and which colours that changed, (...).
+
+    Numbers that are not finite, or too large for single precision, become 0; for the rest see
+    `gamut.without_negatives`.
+    """
+    usable = np.abs(values) <= LARGEST  # not true of NaN; renderers calculate in single precision
+    found = without_negatives(np.where(usable, values, 0.0))
+    return found, (found != values).any(axis=-1)
+
+
+def _difference(before: NDArray[np.float64], after: NDArray[np.float64]) -> NDArray[np.float64]:
+    with np.errstate(invalid="ignore"):
+        return before - after

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -13,8 +13,8 @@ from ..reflectance.brdf import Brdf
 from ..sampling.half_vector import HalfVectorSampler
 from .frame import Image
 from .images import difference
-from .metrics import exposure, image_metrics, psnr, to_srgb8
-from .passes import DEFAULT_SIZE, DEFAULT_SPP, Progress, render, render_all
+from .metrics import exposure, image_metrics, to_srgb8
+from .passes import DEFAULT_SIZE, DEFAULT_SPP, Progress, render_all
 from .scenes import sphere
 
 
@@ -62,20 +62,3 @@ def compare_on_sphere(
     scenes = [partial(sphere, brdf, environment, sampler=sampler, size=size) for brdf in (reference, *candidates)]
     first, *others = render_all(scenes, spp=spp, seed=seed, progress=progress)
     return [Comparison.of(first, image) for image in others]
-
-
-def judge_on_sphere(reference: Brdf, environment: NDArray[np.float32]) -> Callable[[Brdf], float]:
-    """A function that gives a candidate's PSNR over the object [dB], as `compare_on_sphere` with its defaults gives it.
-
-    It renders the reference only once.
-    """
-    sampler = HalfVectorSampler.fitted(reference)
-    first = render(sphere(reference, environment, sampler=sampler))
-    scale = exposure(first.pixels, first.mask)
-    target = to_srgb8(first.pixels[first.mask] * scale)
-
-    def quality(candidate: Brdf) -> float:
-        image = render(sphere(candidate, environment, sampler=sampler))
-        return psnr(target, to_srgb8(image.pixels[first.mask] * scale))
-
-    return quality

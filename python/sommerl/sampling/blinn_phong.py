@@ -38,7 +38,7 @@ class BlinnPhongSampler(Sampler):
         """
         theta_h = np.linspace(0.0, 1.4, 1401) ** 2 / 1.4
         wi, wo = directions(theta_h, np.full_like(theta_h, PI / 8), np.full_like(theta_h, PI / 2))
-        f_r = brdf.eval(np.stack(wi, -1), np.stack(wo, -1)).mean(axis=-1)
+        f_r = np.maximum(brdf.eval(np.stack(wi, -1), np.stack(wo, -1)).mean(axis=-1), 0.0)
         base = f_r.min()
         light = (f_r - base) * np.sin(2 * theta_h) * np.gradient(theta_h)
         if light.sum() <= 1e-6 * base:  # only rounding errors: there is no highlight

@@ -106,8 +106,8 @@ class HalfVectorSampler(Sampler):
         pdf = share * (s * hz) * ((x * x + y * y) * (rim * rim) * (1.0 / 32))
         return f.where(above, pdf, 0.0)
 
-    def albedo(self, theta: ArrayLike) -> NDArray[np.float64]:
-        """The albedo as `Brdf.albedo` defines it, from EXACT² points in each cell on both sides of the viewer's plane.
+    def albedo(self, theta: ArrayLike, *, points: int = EXACT) -> NDArray[np.float64]:
+        """The albedo as `Brdf.albedo` defines it, from points² points in each cell on both sides of the viewer's plane.
 
         theta: the viewer's polar angles [rad], (...). Returns (..., 3). Raises ValueError for angles outside [0, π/2].
         """
@@ -118,7 +118,7 @@ class HalfVectorSampler(Sampler):
         found = np.full((angles.size, 3), np.nan)
         for number in np.flatnonzero(known):
             cos_o = np.cos(angles.reshape(-1)[number : number + 1])
-            sides = [_light(self.brdf, cos_o, EXACT, side)[0].mean(axis=(0, 1, 2, 3)) for side in (1.0, -1.0)]
+            sides = [_light(self.brdf, cos_o, points, side)[0].mean(axis=(0, 1, 2, 3)) for side in (1.0, -1.0)]
             found[number] = (sides[0] + sides[1]) / 2
         return found.reshape(*angles.shape, 3)
 

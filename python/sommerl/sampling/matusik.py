@@ -129,4 +129,4 @@ def _light(brdf: Brdf, theta_o: float) -> NDArray[np.float64]:
     theta, phi = (np.arange(ROWS) + 0.5) * HEIGHT, (np.arange(COLUMNS) + 0.5) * WIDTH
     wi = np.stack(spherical(*np.broadcast_arrays(theta[:, None], phi)), axis=-1)
     f_r = brdf.eval(wi, np.array(spherical(np.float64(theta_o), np.float64(0.0))))
-    return f_r.mean(axis=-1) * _band(np.arange(ROWS))[:, None]
+    return np.maximum(f_r.mean(axis=-1), 0.0) * _band(np.arange(ROWS))[:, None]

@@ -94,13 +94,15 @@ pub struct NodeLookup {
     shape: Py<PyAny>,
     scale: f64,
     signed: bool,
+    smooth: bool,
 }
 
 #[pymethods]
 impl NodeLookup {
     #[new]
     #[pyo3(signature = (
-        theta_h, band, theta_d, phi_d, gains, shapes, gain, shape, scale, reciprocal = true, mirrored = false, signed = false
+        theta_h, band, theta_d, phi_d, gains, shapes, gain, shape, scale, reciprocal = true, mirrored = false, signed = false,
+        smooth = false
     ))]
     #[allow(clippy::too_many_arguments)]
     fn new(
@@ -117,6 +119,7 @@ impl NodeLookup {
         reciprocal: bool,
         mirrored: bool,
         signed: bool,
+        smooth: bool,
     ) -> PyResult<Self> {
         guarded(|| {
             let lattice = NodeLattice {
@@ -129,7 +132,7 @@ impl NodeLookup {
             };
             let steps = NodeSteps::new(&lattice)
                 .ok_or_else(|| invalid("nodes: expected axes that increase from 0 to 180, and a band for each row"))?;
-            let made = NodeLookup { steps, gains, shapes, gain, shape, scale, signed };
+            let made = NodeLookup { steps, gains, shapes, gain, shape, scale, signed, smooth };
             let fits = made.with_factors(py, |factors| Ok(factors.fit(made.steps.nodes())))?;
             if !fits || !scale.is_finite() {
                 return Err(invalid("expected a finite gain, shape and scale for each node"));
@@ -150,8 +153,9 @@ impl NodeLookup {
         guarded(|| {
             let pairs = Pairs::new(&wi, &wo)?;
             self.with_factors(py, |factors| {
-                let (steps, count) = (&self.steps, pairs.wi.len());
-                let material = py.detach(|| NodeMaterial::new(steps, factors, self.scale, self.signed, count));
+                let NodeLookup { steps, scale, signed, smooth, .. } = self;
+                let count = pairs.wi.len();
+                let material = py.detach(|| NodeMaterial::new(steps, factors, *scale, *signed, *smooth, count));
                 pairs.evaluated(py, &material, simd, threads)
             })
         })

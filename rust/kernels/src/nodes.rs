@@ -11,6 +11,7 @@ const KNEE: f64 = 90.0;
 const BELOW: f64 = 360.0;
 const ABOVE: f64 = 120.0;
 const SMALLEST_COSINE: f64 = 0.01;
+const HORIZON: f64 = 0.0009;
 
 /// The two nodes of an axis that a step of the fine grid lies between.
 #[derive(Clone, Copy)]
@@ -168,18 +169,27 @@ pub struct NodeMaterial<'a> {
     scale: f64,
     /// Blended values up to this one count as 0.
     least: f64,
+    /// Whether the cosines that cubes are divided by end smoothly.
+    smooth: bool,
     /// The values of all nodes. Empty for few pairs, whose lookup takes less time than to calculate these.
     values: Vec<[f64; 4]>,
 }
 
 impl<'a> NodeMaterial<'a> {
-    /// scale: of the cube-root domain. signed: whether blended values below 0 count, and not as 0. pairs: how many it will be
-    /// evaluated for.
-    pub fn new(steps: &'a NodeSteps, factors: Factors<'a>, scale: f64, signed: bool, pairs: usize) -> Self {
+    /// scale: of the cube-root domain. signed: whether blended values below 0 count, and not as 0. smooth: whether the cosines
+    /// that their cubes are divided by end smoothly. pairs: how many it will be evaluated for.
+    pub fn new(
+        steps: &'a NodeSteps,
+        factors: Factors<'a>,
+        scale: f64,
+        signed: bool,
+        smooth: bool,
+        pairs: usize,
+    ) -> Self {
         let count = if pairs > steps.nodes / 6 { steps.nodes } else { 0 };
         let values = (0..count).map(|node| factors.value(node)).collect();
         let least = if signed { f64::NEG_INFINITY } else { 0.0 };
-        NodeMaterial { steps, factors, scale, least, values }
+        NodeMaterial { steps, factors, scale, least, smooth, values }
     }
 
     /// Places of a batch on the fine grid, the steps that they lie in, and what cubes are multiplied with.
@@ -196,8 +206,13 @@ impl<'a> NodeMaterial<'a> {
                 at[c][i] = place[c];
                 steps[c][i] = step(place[c]);
             }
-            let [cos_i, cos_o] = pairs.cosines(i).map(|c| c.max(SMALLEST_COSINE));
-            at[3][i] = self.scale / (cos_i * cos_o);
+            let [cos_i, cos_o] = pairs.cosines(i);
+            let damped = if self.smooth {
+                ((cos_i * cos_i + HORIZON) * (cos_o * cos_o + HORIZON)).sqrt()
+            } else {
+                cos_i.max(SMALLEST_COSINE) * cos_o.max(SMALLEST_COSINE)
+            };
+            at[3][i] = self.scale / damped;
         }
     }
 

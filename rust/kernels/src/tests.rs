@@ -170,7 +170,7 @@ fn looks_up_on_nodes(phi_d: Vec<u8>, reciprocal: bool, mirrored: bool, signed: b
     let (gain, shape): (Vec<u16>, Vec<u16>) = (0..30).map(|_| ((next() * 9.0) as u16, (next() * 8.0) as u16)).unzip();
     let factors = Factors { gains: &gains, shapes: &shapes, gain: &gain, shape: &shape };
     assert!(factors.fit(30) && !factors.fit(29));
-    let made = |factors, pairs| NodeMaterial::new(&steps, factors, 0.3, signed, pairs);
+    let made = |factors, pairs| NodeMaterial::new(&steps, factors, 0.3, signed, false, pairs);
     let expected = looked_up(&made(factors, 1000), InstructionSet::PORTABLE, 1);
     let below = |bits: &u64| f64::from_bits(*bits) < 0.0;
     assert_eq!(expected.as_flattened().iter().any(below), signed);

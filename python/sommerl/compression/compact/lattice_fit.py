@@ -6,6 +6,9 @@ axes (θ_h, and θ_d and φ_d of each band of rows) with a Lagrange multiplier, 
 
 The values are a weighted least-squares fit of the interpolation to a million random directions of the source. A small
 ridge holds them to the source's own values at the nodes, which decides where there are few directions.
+
+The lattice folds φ_d as the source allows: where both orders of the directions, or light from both sides of the
+viewer's plane, give the same, half of the nodes are enough.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ from numpy.typing import NDArray
 
 from ...reflectance.arrays import Triple
 from ...reflectance.brdf import Brdf
+from ...reflectance.distance import sidedness
 from ...reflectance.half_diff import directions
 from ...reflectance.nodes import ABOVE, BELOW, FINE, KNEE, SMALLEST_COSINE, NodeLattice, angles_at, damped
 from ...system.errors import MaterialError
@@ -49,11 +53,14 @@ ROWS_FOR_BANDS = 20  # in the best lattice of this many rows, all bands have abo
 # The price of a node, by bisection
 PRICES = -13.0, 3.0  # decades, in units of the error left with FEWEST_ROWS rows: from almost free to far too dear
 BISECTIONS = 20  # 12 give the same lattices
+TINY = 1e-30  # added to sums of weights that may be 0
 UNKNOWN = 1e30  # stands for the error of numbers of nodes that were not examined: more than any error
 
 # The least squares
 DIRECTIONS = 1_000_000  # ten for each node of the largest lattice
-MEASURE_POWER = 0.5  # weights are solid angle times cosines to this power; 0.35 and 0.7 are no better (docs/method.md)
+# Powers of the solid angle and of the cosines in the weights (docs/method.md)
+SOLID_POWER, COSINE_POWER = 0.75, 0.25
+SYMMETRIC = 1e-3  # a source that differs by less (`distance.sidedness`) is mirrored; RGL's files differ by 10⁻⁵ at most
 LOWEST_COSINE = 1e-4  # closer to the horizon, no directions are drawn: f_r may have no bound there
 RIDGE = 0.05  # of the median of the matrix's diagonal; 0.5 costs 0.5 and 1.3 dB, 0.005 gains 0.5 and 0.7 dB
 # Of the conjugate gradients. They converge in fewer than 50 iterations; a tolerance of 10⁻³ costs the fit 2.4 dB.
@@ -77,14 +84,16 @@ class Fitter:
 
     def __init__(self, brdf: Brdf, *, seed: int = 0) -> None:
         self._brdf = brdf
+        self.folds = folds_of(brdf)
+        self._end = FINE + self.folds["mirrored"]  # of the steps in φ_d: the last place is one of its own, or the first
         self._sparse, self._solvers = (
             optional(module, "SciPy", "fitting", "formats") for module in ("scipy.sparse", "scipy.sparse.linalg")
         )
         self._random = np.random.Generator(np.random.PCG64(seed))
-        axes = np.arange(FINE + 1.0), np.arange(0.0, FINE + 1, ROWS_EVERY_D), np.arange(0.0, FINE, ROWS_EVERY_P)
+        axes = np.arange(FINE + 1.0), np.arange(0.0, FINE + 1, ROWS_EVERY_D), np.arange(0.0, self._end, ROWS_EVERY_P)
         wi, wo, f_damped = self._source(*axes)
         seen = np.minimum(wi[2], wo[2]) > SMALLEST_COSINE
-        values = f_damped[seen]
+        values = np.abs(f_damped[seen])
         if not values.any():
             raise MaterialError(f"{brdf.name}: it cannot be compressed, since it is black")
         # The median, or that of the positive values where more than half are 0 (a mirror, a pure colour). In single
@@ -110,7 +119,7 @@ class Fitter:
         Raises MaterialError if `nodes` is not from SMALLEST to LARGEST.
         """
         problem = self.problem(nodes)
-        return FittedTable(problem.lattice, problem.best, self.scale, name=self._brdf.name)
+        return FittedTable(problem.lattice, problem.best, self.scale, signed=self._brdf.signed, name=self._brdf.name)
 
     def problem(self, nodes: int) -> Problem:
         """The least-squares problem on such a lattice, with its solution. Raises MaterialError as `fit` does."""
@@ -125,22 +134,25 @@ class Fitter:
         """
         rows = np.unique(np.linspace(low, high, BAND_ROWS).astype(int)).astype(np.float64)
         thinned, a_line = (high - low + 1) / len(rows), ROWS_EVERY_D * ROWS_EVERY_P
-        grid = self._grid(rows, np.arange(FINE + 1.0), np.arange(0.0, FINE, THETA_D_EVERY_P))
+        grid = self._grid(rows, np.arange(FINE + 1.0), np.arange(0.0, self._end, THETA_D_EVERY_P))
         errors = line_errors(grid.y, grid.weight, 1, self._random)
         theta_d = best_nodes(thinned * THETA_D_EVERY_P / a_line * errors, MOST_NODES)
-        grid = self._grid(rows, np.arange(0.0, FINE + 1, PHI_D_EVERY_D), np.arange(float(FINE)))
+        scale = thinned * PHI_D_EVERY_D / a_line
+        grid = self._grid(rows, np.arange(0.0, FINE + 1, PHI_D_EVERY_D), np.arange(float(self._end)))
+        if self.folds["mirrored"]:
+            found = best_nodes(scale * line_errors(grid.y, grid.weight, 2, self._random), MOST_NODES)
+            return theta_d, {1: ([0], scale * _variation(grid))} | found
         y, weight = (np.concatenate([part, part[:, :, :1]], axis=2) for part in (grid.y, grid.weight))
-        errors = line_errors(y, weight, 2, self._random)
-        found = best_nodes(thinned * PHI_D_EVERY_D / a_line * errors, MOST_NODES + 1)
+        found = best_nodes(scale * line_errors(y, weight, 2, self._random), MOST_NODES + 1)
         return theta_d, {count - 1: (nodes[:-1], error) for count, (nodes, error) in found.items()}
 
     def _source(self, x: Array, y: Array, z: Array) -> tuple[Triple, Triple, Array]:
         """The directions at all points of three axes, and f_r times `damped` there; 0 near and below the horizon."""
-        wi, wo = directions(*angles_at(*np.meshgrid(x, y, z, indexing="ij")))
+        wi, wo = directions(*angles_at(*np.meshgrid(x, y, z, indexing="ij"), **self.folds))
         f_r = np.zeros((*wi[0].shape, 3))
         seen = np.minimum(wi[2], wo[2]) > SMALLEST_COSINE
-        f_r[seen] = self._brdf.eval_both_orders(*(np.stack([c[seen] for c in w], axis=-1) for w in (wi, wo)))
-        return wi, wo, f_r * damped(wi, wo)[..., None]
+        f_r[seen] = self._brdf.eval(*(np.stack([c[seen] for c in w], axis=-1) for w in (wi, wo)))
+        return wi, wo, f_r * damped(wi, wo, smooth=True)[..., None]
 
     def _grid(self, x: Array, y: Array, z: Array) -> _Grid:
         return self._scaled(x, y, z, *self._source(x, y, z))
@@ -150,19 +162,19 @@ class Fitter:
         seen = np.minimum(wi[2], wo[2]) > SMALLEST_COSINE
         for j in range(1, len(y)):  # below the horizon, the value of the last point above it in θ_d
             values[:, j] = np.where(seen[:, j, :, None], values[:, j], values[:, j - 1])
-        return _Grid(values, _measure(*np.meshgrid(x, y, z, indexing="ij"), wi, wo) ** MEASURE_POWER * seen)
+        return _Grid(values, _weight(*np.meshgrid(x, y, z, indexing="ij"), wi, wo) * seen)
 
     def _samples(self) -> None:
         """Draws random directions, uniform over the fine grid, and evaluates the source there."""
         x = (np.arange(DIRECTIONS) + self._random.random(DIRECTIONS)) * (FINE / DIRECTIONS)
         y, z = self._random.random((2, DIRECTIONS)) * FINE
-        wi, wo = directions(*angles_at(x, y, z))
+        wi, wo = directions(*angles_at(x, y, z, **self.folds))
         above = np.minimum(wi[2], wo[2]) > LOWEST_COSINE
         self._places = x[above], y[above], z[above]
         wi, wo = ((w[0][above], w[1][above], w[2][above]) for w in (wi, wo))
-        f_r = self._brdf.eval_both_orders(np.stack(wi, axis=-1), np.stack(wo, axis=-1))
-        self._targets = np.cbrt(f_r * (damped(wi, wo) / self.scale)[:, None])
-        weight = _measure(*self._places, wi, wo) ** MEASURE_POWER
+        f_r = self._brdf.eval(np.stack(wi, axis=-1), np.stack(wo, axis=-1))
+        self._targets = np.cbrt(f_r * (damped(wi, wo, smooth=True) / self.scale)[:, None])
+        weight = _weight(*self._places, wi, wo)
         self._weights = weight / weight.mean()
 
     def _lattice(self, nodes: int) -> NodeLattice:
@@ -202,6 +214,7 @@ class Fitter:
             tuple(used.index(b) for b in bands),
             tuple(tuple(self._theta_d[b][counts[b][0]][0]) for b in used),
             tuple(tuple(self._phi_d[b][counts[b][1]][0]) for b in used),
+            **self.folds,
         )
 
     def _solved(self, lattice: NodeLattice) -> Problem:
@@ -300,9 +313,25 @@ def _costs(choices: Choices) -> Array:
     return np.array([choices[count][1] if count in choices else UNKNOWN for count in range(1, MOST_NODES + 1)])
 
 
-def _measure(x: Array, y: Array, z: Array, wi: Triple, wo: Triple) -> Array:
-    """dω_i dω_o cos θ_i cos θ_o of one step of the fine grid, up to a constant factor."""
+def _variation(grid: _Grid) -> float:
+    """The error of a constant along φ_d, summed over the grid."""
+    weight = grid.weight[..., None]
+    mean = (weight * grid.y).sum(axis=2, keepdims=True) / np.maximum(weight.sum(axis=2, keepdims=True), TINY)
+    return float((weight * (grid.y - mean) ** 2).sum())
+
+
+def _weight(x: Array, y: Array, z: Array, wi: Triple, wo: Triple) -> Array:
+    """What an error counts at a place on the fine grid: the solid angles dω_i dω_o of one step, up to a constant
+    factor, and the cosines (`damped`), each to its power."""
     theta_h, theta_d, _ = angles_at(x, y, z)
     steps = np.where(x < KNEE, 1 / BELOW, 1 / ABOVE)
     solid = np.sqrt(theta_h) * np.sin(theta_h) * np.sin(theta_d) * np.cos(theta_d) * steps
-    return solid * np.maximum(wi[2], 0.0) * np.maximum(wo[2], 0.0)
+    return solid**SOLID_POWER * damped(wi, wo, smooth=True) ** COSINE_POWER
+
+
+def folds_of(brdf: Brdf) -> dict[str, bool]:
+    """How a lattice may fold φ_d for a source, as `NodeLattice` takes it: whether both orders of the directions give
+    the same; and whether light from both sides of the viewer's plane does, by construction or as far as can be seen."""
+    buffers = brdf.buffers()
+    mirrored = brdf.mirrored or sidedness(lambda wi, wo: brdf.f_r(wi, wo, buffers)) < SYMMETRIC
+    return {"reciprocal": brdf.reciprocal, "mirrored": mirrored}

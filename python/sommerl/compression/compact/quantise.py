@@ -9,7 +9,7 @@ use it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -32,7 +32,10 @@ K_MEANS_DRAWS = 4  # for each node: SciPy's k-means takes no weights, so nodes a
 # of fewer than 185 and 433 nodes are affected.
 NODES_A_GAIN, NODES_A_SHAPE = 4, 8
 LEAST_SHOWN = 1e-3  # of the mean weight: so that nodes of almost no weight are presented at all
-DARKEST = 1e-4  # added to values so that black nodes have a shape, too; the smallest gain above 0 is 1/256
+DARKEST = 1e-4  # added to sizes so that black nodes have a shape, too; the smallest gain above 0 is 1/256
+# At most of a shape's channels, at first: a colour whose channels nearly cancel gets a gain that is too large rather
+# than a shape that has no code.
+STEEPEST = 8.0
 TINY = 1e-9  # added to a divisor that is 0 if all nodes have the same shape
 
 # The alternation
@@ -43,7 +46,6 @@ STEER = 2.5  # the price is multiplied by (size / aim) to this power; 1.5 and 4:
 PRICE_CHANGE = 0.3, 3.0  # but by no less and no more than these: one bad estimate must not spoil the price
 RIDGE = 1e-3  # of an entry's curvature: keeps its value where its nodes leave it open; 1e-4 and 1e-2: 0.02 dB
 LEAST_RIDGE = 1e-8  # of the largest curvature: so that entries whose nodes have no weight can be solved for
-WIDEST = 3.0  # the largest r − b of a shape that is nowhere negative: that of (3, 0, 0)
 
 Start = Literal["som", "k-means"]
 
@@ -61,6 +63,11 @@ class Problem:
     right: Floats
     best: Floats
     error: float
+
+    def scaled(self, factors: Floats) -> Problem:
+        """The problem whose values of least error are these times a factor for each node, (nodes)."""
+        best = self.best * factors[:, None]
+        return replace(self, right=np.ascontiguousarray(self.system @ best), best=best)
 
     def excess(self, values: Floats) -> float:
         """By how much the error of other values (nodes, 3) exceeds the least error."""
@@ -84,6 +91,16 @@ class Quantised:
     def palette(self, lattice: NodeLattice) -> Any:
         """The core's object for these palettes on a lattice, which measures and writes streams."""
         return _core.NodePalette(*lattice.axes(), self.gains.tolist(), self.shapes.tolist(), **lattice.folds)
+
+    def stream(self, lattice: NodeLattice) -> bytes:
+        """The stream of a file. The entries have to be `ordered`.
+
+        Raises MaterialError if it would take readers too long (docs/format.md, *A reader's work*).
+        """
+        try:
+            return self.palette(lattice).encode(self.gain_index, self.shape_index)
+        except ValueError as error:
+            raise MaterialError(str(error)) from error
 
     def ordered(self) -> Quantised:
         """The same, without unused and repeated entries, and sorted in the order in which a file stores them."""
@@ -109,14 +126,10 @@ def quantise(
             quantised = _refined(problem, quantised)
         quantised = _swept(problem, quantised.ordered(), price)
         ordered = quantised.ordered()
-        palette = ordered.palette(problem.lattice)
         if turn < TURNS:
-            size = sum(palette.measure(ordered.gain_index, ordered.shape_index)) / 8
+            size = sum(ordered.palette(problem.lattice).measure(ordered.gain_index, ordered.shape_index)) / 8
         else:
-            try:
-                stream = palette.encode(ordered.gain_index, ordered.shape_index)
-            except ValueError as error:
-                raise MaterialError(str(error)) from error
+            stream = ordered.stream(problem.lattice)
             size = len(stream)
             found.append((problem.excess(ordered.values()), ordered, stream))
         if turn:
@@ -128,23 +141,27 @@ def quantise(
 
 def _first(problem: Problem, gains: int, shapes: int, seed: int, start: Start) -> Quantised:
     """Palettes learnt from the best values of the nodes, and for each node the nearest entries."""
-    values = np.maximum(problem.best, 0.0) + DARKEST
-    gain = values.mean(axis=1)
-    shape = values / gain[:, None]
-    octaves = gain_codes(gain)[:, None] / (gain_codes(gain).max() + 1.0)
-    places = coordinates(shape)
-    low = places.min(axis=0)
-    width = float((places - low).max()) + TINY
+    values = problem.best
+    gain: Floats = values.mean(axis=1)
+    least: Floats = np.abs(values).max(axis=1) / STEEPEST + DARKEST
+    gain = np.where(np.abs(gain) < least, np.where(gain < 0, -least, least), gain)
+    octaves, places = gain_codes(gain).astype(np.float64)[:, None], coordinates(values / gain[:, None])
     weight = np.sqrt(problem.system.diagonal() * gain**2)
     train = _som if start == "som" else _k_means
     nodes = len(values)
-    gain_nodes = train(octaves, np.ones(nodes), min(gains, nodes // NODES_A_GAIN), seed)
+    gain_nodes = train(_scaled(octaves), np.ones(nodes), min(gains, nodes // NODES_A_GAIN), seed)
     shown = weight / weight.mean() + LEAST_SHOWN
-    shape_nodes = train((places - low) / width, shown, min(shapes, nodes // NODES_A_SHAPE), seed)
+    shape_nodes = train(_scaled(places), shown, min(shapes, nodes // NODES_A_SHAPE), seed)
     gain_lut, shape_lut = gain_codes(gain[gain_nodes]), shape_codes(places[shape_nodes])
-    gain_index = _nearest(gain_codes(gain)[:, None], gain_lut[:, None])
+    gain_index = _nearest(octaves, gain_lut[:, None])
     shape_index = _nearest(shape_codes(places), shape_lut)
     return Quantised(gain_lut, shape_lut, gain_index.astype(np.uint16), shape_index.astype(np.uint16))
+
+
+def _scaled(places: Floats) -> Floats:
+    """Places (nodes, n), moved and scaled to [0, 1] by the same factor on each axis."""
+    away = places - places.min(axis=0)
+    return away / (float(away.max()) + TINY)
 
 
 def _som(x: Floats, weight: Floats, units: int, seed: int) -> NDArray[np.int64]:
@@ -219,14 +236,14 @@ def _refined(problem: Problem, quantised: Quantised) -> Quantised:
         used = _incidence(q.gain_index, shapes[:, c], len(q.gains), system)
         normal = normal + (used.T @ system @ used).toarray()
         wanted = wanted + used.T @ right[:, c]
-    gains = gain_codes(np.maximum(_solved(normal, wanted[:, None], gain_values(q.gains)[:, None])[:, 0], 0.0))
+    gains = gain_codes(_solved(normal, wanted[:, None], gain_values(q.gains)[:, None])[:, 0])
     used = _incidence(q.shape_index, gain_values(gains)[q.gain_index], len(q.shapes), system)
     # The three channels have the same matrix, and a shape's two coordinates and its mean are orthogonal combinations of
     # the channels. So the equations of a coordinate are the same combination of the channels' equations.
     places = _solved(
         (used.T @ system @ used).toarray(), coordinates(used.T @ right), coordinates(shape_values(q.shapes))
     )
-    return Quantised(gains, shape_codes(np.clip(places, -WIDEST, WIDEST)), q.gain_index, q.shape_index)
+    return Quantised(gains, shape_codes(places), q.gain_index, q.shape_index)
 
 
 def _incidence(index: NDArray[Any], values: Floats, entries: int, like: Any) -> Any:

@@ -1,15 +1,15 @@
 """The preset `compact`: searches for the best material of a given size, or the smallest of a given quality.
 
-Quality is measured by a function that the caller passes; the command line passes the PSNR of a rendered sphere. Without
-one, candidates of the same size are compared by their least-squares error.
+Quality is measured by a function that the caller passes (`render.judge` has one). Without one, candidates of the same
+size are compared by their least-squares error.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from math import isfinite
 from operator import index
 
@@ -22,8 +22,9 @@ from ..material import SomManBrdf
 from ..palette import GainsAndShapes
 from ..smrl import file
 from ..smrl.codes import gain_values, shape_values
+from .energy import EnergyBound, at_nodes
 from .lattice_fit import LARGEST, SMALLEST, Fitter
-from .quantise import quantise
+from .quantise import Problem, Quantised, quantise
 
 Quality = Callable[[SomManBrdf], float]  #: of a candidate, in decibels
 Progress = Callable[[int, int], None]  #: steps done, steps in all
@@ -61,6 +62,7 @@ USUAL = (
 # to 1.5 dB, and 1.4 times as many gain at most 0.2 dB (nickel, irid_flake_paint1).
 GAINS, SHAPES = 3.4, 2.6
 MOST_ENTRIES = 1024  # of a palette in a file (docs/format.md)
+DARKENINGS = 3  # of nodes, before a material that reflects too much is made darker as a whole
 
 
 @dataclass(frozen=True)
@@ -100,13 +102,15 @@ class CompactOptions:
 class CompactReport:
     """How the search went.
 
-    psnr_db: the quality of the result; None if no quality function was passed. seconds: wall-clock time.
-    tried: for each candidate its bytes, its nodes, and its quality [dB] (or minus its error).
+    quality: of the result [dB]; None if no quality function was passed. seconds: wall-clock time. tried: for each
+    candidate its bytes, its nodes, and its quality (or minus its error). metrics: how far the result is from the
+    source, by the keys of `render.judge.JUDGED`, where that was measured.
     """
 
-    psnr_db: float | None
+    quality: float | None
     seconds: float
     tried: list[tuple[int, int, float]]
+    metrics: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
 class Compressor:
@@ -125,6 +129,7 @@ class Compressor:
         self._step = step or (lambda: None)
         self._source = source_of(brdf)
         self._fitter = Fitter(brdf, seed=seed)
+        self._bound = EnergyBound(brdf)
         self._step()
 
     def of_size(self, size: int) -> tuple[float, SomManBrdf]:
@@ -182,22 +187,43 @@ class Compressor:
                 f"{self._brdf.name}: its name and source take {head} bytes of the {size} asked for; ask for at least "
                 f"{2 * head} bytes"
             )
-        found, stream = quantise(problem, gains, shapes, size - head, seed=self._seed)
-        material = SomManBrdf(
-            GainsAndShapes(gain_values(found.gains), shape_values(found.shapes), self._fitter.scale),
-            np.stack([found.gain_index, found.shape_index]),
-            problem.lattice,
-            name=self._brdf.name,
-            source_sha256=self._source.sha256,
-            made_from=self._source.made_from,
-        )
-        error = problem.error + problem.excess(found.values())
+        material, stream = self._bounded(problem, gains, shapes, size - head)
+        error = problem.error + problem.excess(material.node_values)
         # Rounded, so that rounding errors, which differ between machines, do not decide between candidates.
         quality = round(self._quality(material), 3) if self._quality else -error
         written = head + len(stream)
         self.tried.append((written, problem.lattice.size, quality))
         self._step()
         return (quality if written <= size else -math.inf), material
+
+    def _bounded(self, problem: Problem, gains: int, shapes: int, room: int) -> tuple[SomManBrdf, bytes]:
+        """The quantised material that does not reflect too much, and its stream, of `room` bytes if possible.
+
+        As long as it does, the values at the nodes that are seen from there are made darker, and quantised again. What
+        is then still too bright is made darker as a whole.
+        """
+        found, stream = quantise(problem, gains, shapes, room, seed=self._seed)
+        material = self._material(problem, found, self._fitter.scale)
+        factors = self._bound.factors(material)
+        for _ in range(DARKENINGS):
+            if factors.min() == 1.0:
+                return material, stream
+            # Squared, since neighbours that are not as bright keep up what is seen between them.
+            problem = problem.scaled(np.cbrt(at_nodes(factors**2, problem.lattice)))
+            found, stream = quantise(problem, gains, shapes, room, seed=self._seed)
+            material = self._material(problem, found, self._fitter.scale)
+            factors = self._bound.factors(material)
+        return self._material(problem, found, self._fitter.scale * float(factors.min())), stream
+
+    def _material(self, problem: Problem, found: Quantised, scale: float) -> SomManBrdf:
+        return SomManBrdf(
+            GainsAndShapes(gain_values(found.gains), shape_values(found.shapes), scale, self._brdf.signed, smooth=True),
+            np.stack([found.gain_index, found.shape_index]),
+            problem.lattice,
+            name=self._brdf.name,
+            source_sha256=self._source.sha256,
+            made_from=self._source.made_from,
+        )
 
 
 def compress(

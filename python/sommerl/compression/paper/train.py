@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -32,16 +32,16 @@ class TrainReport:
     quantisation_error: for each epoch, the mean distance of the cells presented to their winners' weights, in units of
         the table's largest value.
     units_dropped: units that never won, and are not in the LUT.
-    cells_clamped, energy_clamped: cells above the horizon that held a negative or non-finite value, and the share of
-        the energy that was lost with it (`BrdfTable`).
     seconds: wall-clock time.
+    cells_clamped, energy_clamped, energy_averaged: what the table had to change in the source (`info.Counts`).
     """
 
     quantisation_error: list[float]
     units_dropped: int
-    cells_clamped: int
-    energy_clamped: float
     seconds: float
+    cells_clamped: int | None
+    energy_clamped: float | None
+    energy_averaged: float | None
 
 
 def train(
@@ -79,9 +79,7 @@ def train(
         made_from=table.source.made_from,
     )
     dropped = options.clusters - len(cells)
-    return material, TrainReport(
-        errors, dropped, table.cells_clamped, table.energy_clamped, time.perf_counter() - started
-    )
+    return material, TrainReport(errors, dropped, time.perf_counter() - started, **asdict(table.counts))
 
 
 def _start(x: NDArray[np.float32], options: TrainOptions, name: str) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:

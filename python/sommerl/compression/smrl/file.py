@@ -44,7 +44,7 @@ CELLS, NODES = 0, 1
 VERSIONS = {CELLS: 1, NODES: 2}  # that are written; the last one is the newest
 CELLS_HEAD = struct.Struct("<HHHBBI")
 SCALE = struct.Struct("<f")
-RECIPROCAL, MIRRORED, SIGNED = 1, 2, 4  # flags of nodes
+RECIPROCAL, MIRRORED, SIGNED, SMOOTH = 1, 2, 4, 8  # flags of nodes
 MOST_BINS = 2**16 - 1  # on an axis: stored in two bytes
 MOST_CELLS = 2**22  # enough for MERL's larger kind of table, which has 2,916,000
 # The largest index and the largest LUT, not compressed, and room for the rest.
@@ -176,7 +176,8 @@ def _nodes(material: SomManBrdf) -> bytes:
         raise FormatError(f"{material.name}: expected a palette whose values have codes, found others")
     try:
         palette = _core.NodePalette(*lattice.axes(), gains.tolist(), shapes.tolist(), **lattice.folds)
-        flags = RECIPROCAL * lattice.reciprocal | MIRRORED * lattice.mirrored | SIGNED * entries.signed
+        flags = RECIPROCAL * lattice.reciprocal | MIRRORED * lattice.mirrored
+        flags |= SIGNED * entries.signed | SMOOTH * entries.smooth
         return SCALE.pack(entries.scale) + BYTE.pack(flags) + palette.encode(*material.index)
     except (ValueError, OverflowError) as error:
         raise FormatError(f"{material.name}: {error}") from error
@@ -187,8 +188,8 @@ def _from_nodes(version: int, reader: Reader, known: dict[str, Any]) -> SomManBr
     if not 0 < scale < np.inf:
         raise FormatError("expected a positive scale that is finite, found another")
     (flags,) = reader.unpack(BYTE) if version > 1 else (RECIPROCAL,)
-    if flags > RECIPROCAL | MIRRORED | SIGNED:
-        raise FormatError(f"expected flags from 0 to 7, found {flags}")
+    if flags > RECIPROCAL | MIRRORED | SIGNED | SMOOTH:
+        raise FormatError(f"expected flags from 0 to 15, found {flags}")
     folds = bool(flags & RECIPROCAL), bool(flags & MIRRORED)
     try:
         palette, (gain, shape) = _core.NodePalette.decode(reader.rest(), *folds, version)
@@ -197,5 +198,5 @@ def _from_nodes(version: int, reader: Reader, known: dict[str, Any]) -> SomManBr
     theta_d, phi_d = (tuple(map(tuple, axes)) for axes in (palette.theta_d, palette.phi_d))
     lattice = NodeLattice(tuple(palette.theta_h), tuple(palette.band), theta_d, phi_d, *folds)
     shapes, gains = shape_values(np.array(palette.shapes)), gain_values(np.array(palette.gains))
-    entries = GainsAndShapes(gains, shapes, scale, bool(flags & SIGNED))
+    entries = GainsAndShapes(gains, shapes, scale, bool(flags & SIGNED), bool(flags & SMOOTH))
     return SomManBrdf(entries, np.stack([gain, shape]), lattice, **known)

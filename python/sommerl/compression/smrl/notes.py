@@ -32,7 +32,9 @@ KNOWN: dict[str, dict[str, str]] = {
     "metrics": dict.fromkeys(("rmse", "log_error_cosine", "relative_error", "quantisation_error"), NUMBER),
     FACTS: {
         **dict.fromkeys(("reciprocal", "mirrored"), FLAG),
-        **dict.fromkeys(("asymmetry", "coverage", "energy_clamped"), NUMBER),
+        **dict.fromkeys(
+            ("asymmetry", "coverage", "energy_clamped", "energy_averaged", "energy_negative", "darkened"), NUMBER
+        ),
         **dict.fromkeys(("held_out_log_error_cosine", "held_out_median_relative_error"), NUMBER),
         **dict.fromkeys(("samples", "samples_at_the_horizon", "samples_negative"), WHOLE),
         **dict.fromkeys(("cells_near_grazing", "cells_not_measured", "cells_clamped"), WHOLE),

@@ -23,7 +23,7 @@ from ...compression.palette import GainsAndShapes
 from ...reflectance.brdf import Brdf
 from ...reflectance.cells import Lattice
 from ...reflectance.half_diff import phi_d_range
-from ...reflectance.nodes import ABOVE, BELOW, FINE, HALF_PI, KNEE, SMALLEST_COSINE, NodeLattice
+from ...reflectance.nodes import ABOVE, BELOW, FINE, HALF_PI, HORIZON, KNEE, SMALLEST_COSINE, NodeLattice
 from ...sampling import half_vector
 from ...system.errors import FormatError
 from ...system.files import atomic_write
@@ -184,6 +184,7 @@ def _nodes(material: SomManBrdf, buffers: Mapping[str, NDArray[Any]]) -> _Parts:
         "STEPS_THETA": repr(FINE / HALF_PI),
         "STEPS_PHI": repr(FINE / phi_d_range(**places.folds)),
         "SMALLEST_COSINE": repr(SMALLEST_COSINE),
+        "HORIZON": repr(HORIZON),
         "SCALE": _numbers(buffers["scale"])[0],
     }
     reals = [_reals("SOMMERL_LUT", "palette", lut), _reals("SOMMERL_GAIN", "gains", gains)]
@@ -192,7 +193,11 @@ def _nodes(material: SomManBrdf, buffers: Mapping[str, NDArray[Any]]) -> _Parts:
         arrays=[words, *reals, _words("SOMMERL_LATTICE", "lattice", lattice)],
         functions=_template("nodes", CUBE=_template("cube_signed" if palette.signed else "cube_not_signed")),
         fold=_fold(**places.folds),
-        lookup=_template("lookup_nodes", TURN="" if places.mirrored else _template("turn")),
+        lookup=_template(
+            "lookup_nodes",
+            TURN="" if places.mirrored else _template("turn"),
+            DAMPED=_template("damped_smooth" if palette.smooth else "damped"),
+        ),
         values=values,
     )
 

@@ -2,7 +2,7 @@
  * Material files (.smrl), formats 1 and 2, for browsers and Node: docs/format.md has every byte.
  *
  * decode(arrayBuffer) gives kind ("cells" or "nodes"), name, sha256, notes, interpolation, scale, lattice, lut and index;
- * of nodes also signed, gains and gainIndex. lattice has reciprocal, of nodes also mirrored. lut and gains are
+ * of nodes also signed, smooth, gains and gainIndex. lattice has reciprocal, of nodes also mirrored. lut and gains are
  * Float64Arrays, lut in triples. Indices are one for each cell, 0 below the horizon, or one for each node. It throws an
  * Error that says what was expected.
  */
@@ -43,13 +43,13 @@ function nodes(reader, version) {
     const scale = new DataView(reader.take(4).slice().buffer).getFloat32(0, true);
     expect(scale > 0 && scale < Infinity, "a positive scale that is finite, found another");
     const flags = version > 1 ? reader.number(1) : 1;
-    expect(flags < 8, `flags from 0 to 7, found ${flags}`);
-    const [reciprocal, mirrored, signed] = [1, 2, 4].map((bit) => (flags & bit) > 0);
+    expect(flags < 16, `flags from 0 to 15, found ${flags}`);
+    const [reciprocal, mirrored, signed, smooth] = [1, 2, 4, 8].map((bit) => (flags & bit) > 0);
     const { lattice, gainCodes, shapeCodes, gainIndex, index } = readNodes(reader.rest(), mirrored, version);
     const gains = Float64Array.from(gainCodes, (code) => Math.sign(code) * gain(Math.abs(code)));
     const lut = Float64Array.from(shapeCodes.flatMap(shape));
-    const known = { kind: "nodes", interpolation: "trilinear", scale, signed, lattice: { ...lattice, reciprocal } };
-    return { ...known, gains, lut, gainIndex, index };
+    const known = { kind: "nodes", interpolation: "trilinear", scale, signed, smooth };
+    return { ...known, lattice: { ...lattice, reciprocal }, gains, lut, gainIndex, index };
 }
 
 function gain(code) {
