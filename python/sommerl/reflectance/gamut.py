@@ -27,12 +27,14 @@ def without_negatives(rgb: Values) -> Values:
 
 def _projected(colours: Values) -> Values:
     """Of colours (n, 3). Channels that have to be 0 are found one after the other (Michelot 1986)."""
-    luminance = (colours @ LUMINANCE)[:, None]
     kept = colours > 0
-    for _ in range(2):  # a colour of positive luminance keeps at least one of its three channels
-        weights = np.where(kept, LUMINANCE, 0.0)
-        norm = (weights**2).sum(axis=-1, keepdims=True)
-        surplus = (weights * colours).sum(axis=-1, keepdims=True) - luminance
-        moved = np.where(kept, colours - weights * surplus / np.where(norm > 0, norm, 1.0), 0.0)
-        kept &= moved > 0
-    return np.where(kept & (luminance > 0), moved, 0.0)
+    kept &= _foot(colours, kept) > 0  # without the negative channels, another one may have become negative
+    return np.where(kept & (colours @ LUMINANCE > 0)[:, None], _foot(colours, kept), 0.0)
+
+
+def _foot(colours: Values, kept: NDArray[np.bool_]) -> Values:
+    """The nearest colours of the same luminance, of which only the kept channels (n, 3) are not 0."""
+    weights = np.where(kept, LUMINANCE, 0.0)
+    norm = (weights**2).sum(axis=-1, keepdims=True)
+    surplus = (weights * colours).sum(axis=-1, keepdims=True) - (colours @ LUMINANCE)[:, None]
+    return colours - weights * surplus / np.where(norm > 0, norm, 1.0)
