@@ -29,7 +29,8 @@ def _projected(colours: Values) -> Values:
     """Of colours (n, 3). Channels that have to be 0 are found one after the other (Michelot 1986)."""
     kept = colours > 0
     kept &= _foot(colours, kept) > 0  # without the negative channels, another one may have become negative
-    return np.where(kept & (colours @ LUMINANCE > 0)[:, None], _foot(colours, kept), 0.0)
+    lit = (colours @ LUMINANCE > 0)[:, None]
+    return np.where(kept & lit, np.maximum(_foot(colours, kept), 0.0), 0.0)  # rounding may go below 0
 
 
 def _foot(colours: Values, kept: NDArray[np.bool_]) -> Values:
