@@ -1,5 +1,6 @@
 """How commands end: a sentence and an exit status, whatever happens, also where nobody can be told."""
 
+import os
 import subprocess
 import sys
 
@@ -62,9 +63,12 @@ def test_where_it_came_from_on_request(capsys, monkeypatch):
     assert "\x1b" not in err
 
 
-def ended(shell):
-    """Exit status, standard output and standard error of a line of the shell, with $0 for the command line."""
-    done = subprocess.run(["sh", "-c", shell, f"{sys.executable} -m sommerl"], capture_output=True, text=True)
+def ended(shell, *, buffered=True):
+    """Exit status, standard output and standard error of a line of the shell, with $0 for the command line. buffered:
+    whether Python writes what it prints when a buffer is full or it ends, as usual, or at once."""
+    environment = {**os.environ, "PYTHONUNBUFFERED": "" if buffered else "1"}
+    arguments = ["sh", "-c", shell, f"{sys.executable} -m sommerl"]
+    done = subprocess.run(arguments, capture_output=True, text=True, env=environment)
     return done.returncode, done.stdout, done.stderr
 
 
@@ -81,16 +85,17 @@ STREAMS = {
 }
 
 
-def check_ends(shell, status, err):
-    found, out, said = ended(shell)
+def check_ends(shell, status, err, *, buffered=True):
+    found, out, said = ended(shell, buffered=buffered)
     assert (found, said) == (status, err)
     assert bool(out) == (status == 0)
 
 
+@pytest.mark.parametrize("buffered", [True, False])
 @pytest.mark.parametrize("streams", STREAMS)
 @pytest.mark.parametrize("command", ["info nickel", "info nickel --json", "--help"])
-def test_streams_that_are_closed_or_full(command, streams):
-    check_ends(f"$0 {command} {streams}", *STREAMS[streams])
+def test_streams_that_are_closed_or_full(command, streams, buffered):
+    check_ends(f"$0 {command} {streams}", *STREAMS[streams], buffered=buffered)
 
 
 def test_what_python_itself_makes_of_it_is_noticed():

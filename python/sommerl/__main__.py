@@ -29,7 +29,8 @@ def main() -> int:
         os._exit(STATUS)
     ignore_signals()
     if not settled() and status == 0:
-        return fail("standard output: cannot be written", 1)
+        status = fail("standard output: cannot be written", 1)
+        settled()
     return status
 
 

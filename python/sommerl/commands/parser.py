@@ -64,7 +64,7 @@ class Parser(argparse.ArgumentParser):
     def _print_message(self, message: str, file: Any = None) -> None:
         """As argparse does, but that help which cannot be printed is an error."""
         if file is sys.stdout:
-            print(message, end="")
+            print(message, end="", flush=True)
         else:
             super()._print_message(message, file)
 
