@@ -17,10 +17,12 @@ const RATE: u32 = 4;
 /// The most bits that a number has after the first.
 const LONGEST: u32 = 20;
 
-/// The weights of symbols, all above 0, and their sum, which is below 2^24.
+/// How likely symbols are.
 #[derive(Clone, Copy)]
 pub struct Weights<'a> {
+    /// Those of all symbols, all above 0.
     pub each: &'a [u32],
+    /// Their sum, which is below 2^24.
     pub total: u32,
 }
 
