@@ -1,5 +1,9 @@
 //! How likely each gain, or each shape, is: weights that fall with the distance from the predicted place.
 
+use std::ops::Range;
+
+use crate::range_coder::Weights;
+
 /// The two kernels. An entry at distance x, in units of the expected error, has the height 1 / (1 + x² NARROW)² or
 /// 1 / (1 + x² WIDE)².
 const NARROW: f64 = 2.25;
@@ -30,8 +34,9 @@ pub struct Entries {
     narrow: f64,
     /// What the two kernels are multiplied with, so that over all entries both together add up to 1.
     factors: [f64; 2],
-    /// What `weigh` found.
-    pub weights: Vec<u32>,
+    /// What `weigh` found, and where those are that are not 1.
+    weights: Vec<u32>,
+    reach: Range<usize>,
     /// The number of entries within `REACH`, added up over all calls of `weigh`.
     pub reached: usize,
     /// Memory for the heights of the two kernels.
@@ -56,14 +61,15 @@ impl Entries {
             narrow: 0.5,
             factors: [1.0; 2],
             weights: vec![1; n],
+            reach: 0..0,
             reached: 0,
             heights: [vec![0.0; n], vec![0.0; n]],
         }
     }
 
-    /// Calculates `weights`.
+    /// The weights of all entries.
     #[inline(always)]
-    pub fn weigh(&mut self, expected: &Expected) {
+    pub fn weigh(&mut self, expected: &Expected) -> Weights<'_> {
         let [(p0, s0), (p1, s1)] = *expected;
         let reach = REACH / s0;
         let range = self.before[step(p0 - reach)].into()..self.before[step(p0 + reach) + 1].into();
@@ -77,11 +83,15 @@ impl Entries {
         }
         self.factors = [self.narrow / sum(narrow), (1.0 - self.narrow) / sum(wide)];
         let [to_narrow, to_wide] = self.factors.map(|factor| factor * WHOLE);
-        self.weights.fill(1);
+        self.weights[std::mem::replace(&mut self.reach, range.clone())].fill(1);
         let weights = &mut self.weights[range];
+        let mut above_1 = 0;
         for i in 0..roots.len() {
-            weights[i] = 1 + (narrow[i] * to_narrow + wide[i] * to_wide) as u32;
+            let more = (narrow[i] * to_narrow + wide[i] * to_wide) as u32;
+            weights[i] = 1 + more;
+            above_1 += more;
         }
+        Weights { each: &self.weights, total: self.weights.len() as u32 + above_1 }
     }
 
     /// Adapts to the entry that came. expected: as for the last call of `weigh`.

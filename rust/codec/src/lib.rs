@@ -38,6 +38,6 @@ pub use error::Error;
 pub use lattice::{FINE, NodeLattice};
 pub use model::Model;
 pub use palette::Palette;
-pub use range_coder::bits_of;
+pub use range_coder::{Weights, bits_of};
 pub use sommerl_simd::InstructionSet;
 pub use stream::{CompactMaterial, Layout, check_indices, decode, encode, measure};

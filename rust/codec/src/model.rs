@@ -6,6 +6,7 @@ use crate::entries::{Entries, Expected};
 use crate::lattice::{FINE, NodeLattice};
 use crate::palette::Palette;
 use crate::predictor::Predictor;
+use crate::range_coder::Weights;
 
 /// A node's coordinates: octaves of the gain, and the two of the shape.
 const CHANNELS: usize = 3;
@@ -136,18 +137,16 @@ impl<'a> Model<'a> {
 
     /// The weights of all gains for the node of `expect`.
     #[inline(always)]
-    pub fn gain_weights(&mut self) -> &[u32] {
+    pub fn gain_weights(&mut self) -> Weights<'_> {
         let expected = self.gain_expected();
-        self.gains.weigh(&expected);
-        &self.gains.weights
+        self.gains.weigh(&expected)
     }
 
     /// The weights of all shapes for the node of `expect`.
     #[inline(always)]
-    pub fn shape_weights(&mut self) -> &[u32] {
+    pub fn shape_weights(&mut self) -> Weights<'_> {
         let expected = self.shape_expected();
-        self.shapes.weigh(&expected);
-        &self.shapes.weights
+        self.shapes.weigh(&expected)
     }
 
     /// The number of gains and shapes whose weights were calculated and not taken as 1, added up over all nodes so far.

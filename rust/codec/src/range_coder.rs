@@ -4,6 +4,8 @@
 //! stream: `Decoder::is_the_encoders` tells whether the one that was read is the one that an encoder writes.
 
 const BOTTOM: u32 = 1 << 24;
+/// Weights that a decoder passes over at once, by their sum.
+const AT_ONCE: usize = 16;
 
 /// The chances of 24 bits to be one, out of `2 * EVEN`; they adapt to the bits that come.
 pub type Context = [u32; 24];
@@ -15,13 +17,22 @@ const RATE: u32 = 4;
 /// The most bits that a number has after the first.
 const LONGEST: u32 = 20;
 
+/// How likely symbols are.
+#[derive(Clone, Copy)]
+pub struct Weights<'a> {
+    /// Those of all symbols, all above 0.
+    pub each: &'a [u32],
+    /// Their sum, which is below 2^24.
+    pub total: u32,
+}
+
 /// What is common to writing and to reading, so that a part of the format is one function for both. The function passes each value
 /// and goes on with the one that is returned. An `Encoder` writes the value that is passed, and returns it. A `Decoder` ignores
 /// the value that is passed, for which 0 does, and returns the one that it reads. A `BitCounter` adds up what the value takes, and
 /// returns it.
 pub trait Coder {
-    /// One of several symbols. Weights are all above 0, and their sum is below 2^24.
-    fn pick(&mut self, symbol: usize, weights: &[u32]) -> usize;
+    /// One of several symbols.
+    fn pick(&mut self, symbol: usize, weights: Weights<'_>) -> usize;
 
     /// Whether a decoder has read what is no symbol. What it has returned since then means nothing.
     fn lost(&self) -> bool {
@@ -30,7 +41,8 @@ pub trait Coder {
 
     /// A bit. `one`: its chance to be one, which adapts to it.
     fn bit(&mut self, bit: bool, one: &mut u32) -> bool {
-        let bit = self.pick(bit.into(), &[2 * EVEN - *one, *one]) == 1;
+        let weights = Weights { each: &[2 * EVEN - *one, *one], total: 2 * EVEN };
+        let bit = self.pick(bit.into(), weights) == 1;
         *one = if bit { *one + ((2 * EVEN - *one) >> RATE) } else { *one - (*one >> RATE) };
         bit
     }
@@ -113,10 +125,10 @@ fn roundest(low: u64, range: u32) -> u64 {
 
 impl Coder for Encoder {
     #[inline(always)]
-    fn pick(&mut self, symbol: usize, weights: &[u32]) -> usize {
-        let share = self.range / weights.iter().sum::<u32>();
-        self.low += u64::from(share * weights[..symbol].iter().sum::<u32>());
-        self.range = share * weights[symbol];
+    fn pick(&mut self, symbol: usize, weights: Weights<'_>) -> usize {
+        let share = self.range / weights.total;
+        self.low += u64::from(share * weights.each[..symbol].iter().sum::<u32>());
+        self.range = share * weights.each[symbol];
         while self.range < BOTTOM {
             self.range <<= 8;
             self.shift();
@@ -164,18 +176,24 @@ impl<'a> Decoder<'a> {
 
 impl Coder for Decoder<'_> {
     #[inline(always)]
-    fn pick(&mut self, _: usize, weights: &[u32]) -> usize {
-        let total = weights.iter().sum::<u32>();
+    fn pick(&mut self, _: usize, Weights { each, total }: Weights<'_>) -> usize {
         let share = self.range / total;
         let at = (self.code / share).min(total - 1);
         self.lost |= self.code / share >= total;
         let (mut symbol, mut below) = (0, 0);
-        while below + weights[symbol] <= at {
-            below += weights[symbol];
+        for part in each.chunks_exact(AT_ONCE) {
+            let sum = part.iter().sum::<u32>();
+            if below + sum > at {
+                break;
+            }
+            (symbol, below) = (symbol + AT_ONCE, below + sum);
+        }
+        while below + each[symbol] <= at {
+            below += each[symbol];
             symbol += 1;
         }
         self.code = self.code.wrapping_sub(share * below);
-        self.range = share * weights[symbol];
+        self.range = share * each[symbol];
         while self.range < BOTTOM {
             self.range <<= 8;
             self.shift();
@@ -194,8 +212,8 @@ pub struct BitCounter(pub f64);
 
 impl Coder for BitCounter {
     #[inline(always)]
-    fn pick(&mut self, symbol: usize, weights: &[u32]) -> usize {
-        self.0 += bits_of(weights[symbol], weights.iter().sum());
+    fn pick(&mut self, symbol: usize, weights: Weights<'_>) -> usize {
+        self.0 += bits_of(weights.each[symbol], weights.total);
         symbol
     }
 }

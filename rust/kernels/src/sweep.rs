@@ -1,7 +1,7 @@
 //! Chooses the gain and the shape of each node, one node after the other: those that cost the least in error and bits, given
 //! what the other nodes have at that time.
 
-use sommerl_codec::{Model, NodeLattice, Palette, bits_of};
+use sommerl_codec::{Model, NodeLattice, Palette, Weights, bits_of};
 
 /// Half the error is zᵀHz/2 − bᵀz for each of r, g and b: H sparse, by rows.
 pub struct Quadratic<'a> {
@@ -141,9 +141,9 @@ fn least(values: impl Iterator<Item = f64>) -> (usize, f64) {
 }
 
 /// The bits that each entry would take.
-fn costs(weights: &[u32], bits: &mut [f64]) {
-    let total = weights.iter().sum();
-    for (bits, &weight) in bits.iter_mut().zip(weights) {
-        *bits = bits_of(weight, total);
+fn costs(weights: Weights<'_>, bits: &mut [f64]) {
+    let of_1 = bits_of(1, weights.total); // most weights are 1, and logarithms take long
+    for (bits, &weight) in bits.iter_mut().zip(weights.each) {
+        *bits = if weight == 1 { of_1 } else { bits_of(weight, weights.total) };
     }
 }
