@@ -10,22 +10,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-import numpy as np
+from representations import compact, merl_table, preset
 
-from sommerl import Brdf, BrdfTable, SommerlError, TrainOptions, compress, load, train
+from sommerl import BrdfTable, SommerlError, load
 from sommerl.plots.contact_sheet import captioned
+from sommerl.render.compare import Comparison
 from sommerl.render.images import write_image
-from sommerl.render.judge import under_one_lamp
-from sommerl.render.metrics import exposure, psnr, to_srgb8
-
-
-def made_from(source: Brdf, sizes: list[int]) -> dict[str, Brdf]:
-    """Compact files, the paper's representation, and the table that this is made from."""
-    found = {f"compact, {size:,} B": compress(source, target_size=size)[0] for size in sizes}
-    table = BrdfTable.of(source)
-    paper = train(table, TrainOptions())[0]
-    found |= {f"paper, M = 256, {how}": paper.with_interpolation(how) for how in ("nearest", "trilinear")}
-    return found | {"MERL table, trilinear": table.with_interpolation("trilinear")}
+from sommerl.render.judge import Judge, under_one_lamp
+from sommerl.render.metrics import psnr
 
 
 def main() -> None:
@@ -37,15 +29,12 @@ def main() -> None:
     options = parser.parse_args()
     try:
         source = load(options.material)
-        reference = under_one_lamp(source, options.size).astype(np.float32)
-        inside = np.hypot(*np.meshgrid(*[(np.arange(options.size) + 0.5) / options.size * 2 - 1] * 2)) < 1
-        scale = exposure(reference, inside)
-        shown = to_srgb8(reference * scale)
-        pictures = {f"{source.name}, as measured": shown}
-        for name, brdf in made_from(source, options.sizes).items():
-            picture = to_srgb8(under_one_lamp(brdf, options.size).astype(np.float32) * scale)
-            pictures[f"{name}: {psnr(shown[inside], picture[inside]):.1f} dB"] = picture
-        write_image(options.output, captioned(list(pictures.items()), 4))
+        table, reference = BrdfTable.of(source), under_one_lamp(source, options.size)
+        pictures = {f"{source.name}, as measured": Comparison(reference, reference, {}).exposed()[0]}
+        for made in (*compact(source, Judge(source), options.sizes), *preset(table), *merl_table(table)):
+            shown, picture = Comparison(reference, under_one_lamp(made.brdf, options.size), {}).exposed()
+            pictures[f"{made.label}: {psnr(shown[reference.mask], picture[reference.mask]):.1f} dB"] = picture
+        write_image(options.output, captioned(list(pictures.items()), 3))
     except SommerlError as error:
         raise SystemExit(f"error: {error}") from error
 

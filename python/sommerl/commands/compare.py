@@ -60,21 +60,17 @@ def compare(options: CompareArguments) -> dict[str, Any]:
         comparison = compare_on_sphere(brdfs[0], [brdfs[1]], environment, **asdict(sampling), progress=advance)[0]
     if options.output:
         write_image(options.output, side_by_side(comparison.pictures()))
-    with console.progress("judging"):
-        judged = Judge(brdfs[0]).metrics(brdfs[1])
-    metrics = table_distance(*brdfs)
+    distances, distance_rows = distances_of(*brdfs)
     reference, candidate = (
         f"{label} ({brdf.lookup})"
         for label, brdf in zip(labels(sources, [brdf.name for brdf in brdfs]), brdfs, strict=True)
     )
-    result: dict[str, Any] = comparison.metrics | {f"table_{name}": value for name, value in metrics.items()}
-    result |= judged | {"reference": reference, "candidate": candidate}
+    result: dict[str, Any] = comparison.metrics | distances | {"reference": reference, "candidate": candidate}
     if options.output:
         result["image"] = str(options.output)
     if not options.json:
         lookups = dict.fromkeys((brdfs[1].lookup, brdfs[0].lookup))
-        rows = {"lookup": " against ".join(lookups)} | image_rows(comparison.metrics)
-        rows |= judged_rows(judged) | table_rows(metrics)
+        rows = {"lookup": " against ".join(lookups)} | image_rows(comparison.metrics) | distance_rows
         console.print_rows(f"{options.candidate} against {options.reference}", rows)
         if options.output:
             console.wrote([options.output])
@@ -100,7 +96,16 @@ def looked_up_alike(reference: Brdf, candidate: Brdf, asked: Interpolation | Non
     return adapted(reference, candidate), adapted(candidate, reference)
 
 
-def table_distance(reference: Brdf, candidate: Brdf) -> dict[str, float]:
+def distances_of(reference: Brdf, candidate: Brdf) -> tuple[dict[str, float], dict[str, str]]:
+    """How far two are apart without a picture, for JSON and for people: as a `Judge` sees it, and at cell centres."""
+    with console.progress("judging"):
+        judged = Judge(reference).metrics(candidate)
+    tables = _table_distance(reference, candidate)
+    found = judged | {f"table_{name}": value for name, value in tables.items()}
+    return found, judged_rows(judged) | table_rows(tables)
+
+
+def _table_distance(reference: Brdf, candidate: Brdf) -> dict[str, float]:
     """How far two are apart at the cell centres of one lattice: the reference's, the candidate's or MERL's."""
     lattices = [brdf.grid for brdf in (reference, candidate) if brdf.grid]
     first, second = (BrdfTable.sampled(brdf, *lattices[:1]) for brdf in (reference, candidate))

@@ -22,7 +22,6 @@ from ..render.checkpoint import Checkpoint, checkpoint_of, content, content_of
 from ..render.compare import Comparison
 from ..render.frame import Image, Scene
 from ..render.images import DIFFERENCE_GAIN, signed_difference, write_image
-from ..render.judge import Judge
 from ..render.llvm import mitsuba
 from ..render.meshes import Mesh, load_mesh
 from ..render.metrics import exposure, flip_map, to_srgb8
@@ -34,12 +33,12 @@ from ..sampling.sampler import Sampler
 from ..system.errors import MaterialError, OptionError, SommerlError
 from . import answers, console, render_own
 from .checks import check_apart, check_output
-from .compare import looked_up_alike, table_distance
+from .compare import distances_of, looked_up_alike
 from .inputs import expanded, labels, stem
 from .parser import add_command
 from .render_arguments import DEFAULT_SCENE, RenderArguments
 from .rendering import Sampling, check_environment, environment_of, goes_on_from
-from .rows import image_rows, judged_rows, table_rows
+from .rows import image_rows
 
 MOST_PIXELS = 2**26  # of a sheet
 MOST_COMPARED = 2**23  # of one that is compared: the metrics take some 260 bytes for each
@@ -181,10 +180,9 @@ def _render(options: RenderArguments) -> dict[str, Any]:
         rows = image_rows(comparison.metrics)
         held = [pair for pair in pairs if pair.against is not None]
         if len(held) == 1:  # those of several materials would be no figure of any
-            both = materials.both(held[0])
-            judged, tables = Judge(both[0]).metrics(both[1]), table_distance(*both)
-            result |= judged | {f"table_{name}": value for name, value in tables.items()}
-            rows |= judged_rows(judged) | table_rows(tables)
+            distances, distance_rows = distances_of(*materials.both(held[0]))
+            result |= distances
+            rows |= distance_rows
     checkpoint.remove()
     if not options.json:
         rendered = ", ".join(one["label"] for one in shown[:3]) + (f" and {len(shown) - 3} more" if shown[3:] else "")

@@ -19,6 +19,7 @@ from ..reflectance.distance import LOG_FLOOR
 from ..reflectance.half_diff import spherical
 from ..reflectance.metric import Metric, decibels, measured
 from .environment import HORIZON, LIGHTS, ZENITH
+from .frame import Image
 from .metrics import exposure, psnr, to_srgb8
 
 SIDE = 72  # pixels of a picture
@@ -86,12 +87,12 @@ def seen(brdf: Brdf) -> Seen:
     )
 
 
-def under_one_lamp(brdf: Brdf, side: int) -> Values:
-    """The linear picture (side, side, 3) of the sphere under the one lamp; 0 around the sphere."""
+def under_one_lamp(brdf: Brdf, side: int) -> Image:
+    """The picture of the sphere under the one lamp, side × side pixels; 0 around the sphere."""
     inside, normals = _normals(side)
-    found = np.zeros((side * side, 3))
+    found = np.zeros((side * side, 3), np.float32)
     found[inside] = _lit(brdf, normals, *_key_lamp())
-    return found.reshape(side, side, 3)
+    return Image(found.reshape(side, side, 3), inside.reshape(side, side))
 
 
 def _lit(brdf: Brdf, normals: Vectors, lamps: Vectors, power: Values) -> Values:
