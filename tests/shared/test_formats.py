@@ -97,8 +97,8 @@ def test_cornell(name):
     assert np.allclose(table.eval(wi, wo), table.eval(wo, wi), rtol=1e-12)
 
 
-def test_neural_fits_are_the_stand_ins(stand_in):
-    table = load(stand_in("nickel"))
+def test_neural_fits_are_the_stand_ins(nbrdf_stand_in):
+    table = load(nbrdf_stand_in("nickel"))
     network = BrdfTable.sampled(load(f"{DATA / 'nbrdf' / 'merl.npz'}:nickel"))
     above = table.lattice.above_horizon
     assert np.allclose(network.values[above], table.values[above], rtol=1e-6, atol=1e-9)

@@ -1,4 +1,4 @@
-"""The paper's cases on NBRDF stand-ins: goals, not measured bests."""
+"""The paper's cases on NP stand-ins: goals, not measured bests."""
 
 import statistics
 
