@@ -61,12 +61,14 @@ class Decoder {
         if (at >= total) throw new Error("stream: expected symbols of the range coder, found a code beyond all of them");
         let symbol = Math.min(at, first);
         let below = symbol;
+        let weight = 1;
         if (symbol === first) {
             while (symbol < end && below + weights[symbol] <= at) below += weights[symbol++];
-            if (symbol === end) [symbol, below] = [end + at - below, at];
+            if (symbol < end) weight = weights[symbol];
+            else [symbol, below] = [end + at - below, at];
         }
         this.code -= share * below;
-        this.range = share * weights[symbol];
+        this.range = share * weight;
         while (this.range < 2 ** 24) {
             this.range *= 256;
             this.code = 256 * this.code + this.next();
@@ -189,59 +191,77 @@ class Model {
     moved(plane, from, to) {
         const { thetaD, phiD, mirrored } = this.lattice;
         const width = phiD[from].length;
-        const way = mirrored ? (axis, x) => between(axis, axis.length, x) : around;
-        const ways = thetaD[to].flatMap((y) =>
-            phiD[to].map((x) => [...between(thetaD[from], thetaD[from].length, y), ...way(phiD[from], x)]),
-        );
-        const blend = (a) => ([d0, d1, v, p0, p1, u]) => {
-            const low = a[d0 * width + p0] * (1 - u) + a[d0 * width + p1] * u;
-            const high = a[d1 * width + p0] * (1 - u) + a[d1 * width + p1] * u;
-            return low * (1 - v) + high * v;
+        const rows = thetaD[to].map((y) => between(thetaD[from], thetaD[from].length, y));
+        const columns = phiD[to].map((x) => (mirrored ? between(phiD[from], width, x) : around(phiD[from], x)));
+        const blended = (a) => {
+            const found = new Float64Array(rows.length * columns.length);
+            let at = 0;
+            for (const [d0, d1, v] of rows) {
+                for (const [p0, p1, u] of columns) {
+                    const low = a[d0 * width + p0] * (1 - u) + a[d0 * width + p1] * u;
+                    const high = a[d1 * width + p0] * (1 - u) + a[d1 * width + p1] * u;
+                    found[at++] = low * (1 - v) + high * v;
+                }
+            }
+            return found;
         };
-        return plane.map((grids) => grids.map((a) => Float64Array.from(ways, blend(a))));
+        return plane.map((grids) => grids.map(blended));
     }
 
     /** Has each coordinate's predictor predict. */
     expect(d, p) {
-        const { phiD, width, predictors } = this;
+        const { phiD, width, predictors, row, present, above } = this;
         const m = FINE - phiD[p];
         const mirror = p > 0 && m <= phiD[p - 1] ? between(phiD, p, m) : null;
         const at = d * width + p;
+        const west = before(p, width, this.lattice.mirrored) - p;
+        const east = after(p, width, this.lattice.mirrored) - p;
         for (let c = 0; c < 3; c++) {
             const predictor = predictors[c];
-            const up = this.neighbours(c, d, p, mirror, predictor.x);
-            let [total, count] = [0.7 * predictor.level, 0.7];
-            if (p > 0) [total, count] = [total + this.present[1][c][at - 1], count + 1];
-            if (d > 0) [total, count] = [total + this.present[1][c][at - width], count + 1];
-            if (this.row > 0) [total, count] = [total + this.above[1][c][at], count + 1];
+            const up = this.neighbours(c, d, p, west, east, mirror, predictor.x);
+            let total = 0.7 * predictor.level;
+            let count = 0.7;
+            if (p > 0) {
+                total += present[1][c][at - 1];
+                count += 1;
+            }
+            if (d > 0) {
+                total += present[1][c][at - width];
+                count += 1;
+            }
+            if (row > 0) {
+                total += above[1][c][at];
+                count += 1;
+            }
             predictor.predict(up, total / count);
         }
     }
 
-    /** Fills in the values; returns the one that all are compared with. */
-    neighbours(c, d, p, mirror, values) {
-        const { width } = this;
-        const [now, above, higher] = [this.present[0][c], this.above?.[0][c], this.higher?.[0][c]];
-        const [line, at, under] = [d * width, d * width + p, this.row > 0];
-        const [west, east] = beside(p, width, this.lattice.mirrored).map((q) => line + q);
+    /** Fills in the values; returns the one that all are compared with. west, east: how far the nodes beside it are. */
+    neighbours(c, d, p, west, east, mirror, values) {
+        const { width, row } = this;
+        const [line, at] = [d * width, d * width + p];
+        const now = this.present[0][c];
+        const under = row > 0;
+        const above = under ? this.above[0][c] : now;
         let up = p > 0 ? now[at - 1] : d > 0 ? now[at - width] : 0;
         if (p > 0 && d > 0) up = 0.5 * (now[at - 1] + now[at - width]);
         if (under) up = above[at];
         let news = 0;
         if (mirror) {
             const [q0, q1, u] = mirror;
-            const before = under ? above[line + q0] * (1 - u) + above[line + q1] * u : up;
-            news = now[line + q0] * (1 - u) + now[line + q1] * u - before;
+            const known = under ? above[line + q0] * (1 - u) + above[line + q1] * u : up;
+            news = now[line + q0] * (1 - u) + now[line + q1] * u - known;
         }
-        values[0] = p > 0 ? now[at - 1] : under ? above[west] : up;
+        values[0] = p > 0 ? now[at - 1] : under ? above[at + west] : up;
         values[1] = d > 0 ? now[at - width] : up;
-        values[2] = d > 0 ? now[west - width] : up;
-        values[3] = d > 0 ? now[east - width] : up;
-        values[4] = under ? above[west] : up;
+        values[2] = d > 0 ? now[at + west - width] : up;
+        values[3] = d > 0 ? now[at + east - width] : up;
+        values[4] = under ? above[at + west] : up;
         values[5] = under && d > 0 ? above[at - width] : up;
-        values[6] = under ? above[east] : up;
+        values[6] = under ? above[at + east] : up;
         values[7] = under && d + 1 < this.height ? above[at + width] : up;
-        values[8] = this.row > 1 ? higher[at] : up;
+        values[8] = row > 1 ? this.higher[0][c][at] : up;
         values[9] = up + news;
         return up;
     }
@@ -276,14 +296,22 @@ class Predictor {
     learn(value) {
         const { matrix, w, x, g } = this;
         const error = value - this.predicted;
-        g.fill(0);
-        for (let i = 0; i < 10; i++) for (let j = 0; j < 10; j++) g[j] += matrix[10 * i + j] * x[i];
         let power = 1;
-        for (let i = 0; i < 10; i++) power += g[i] * x[i];
+        for (let i = 0; i < 10; i++) {
+            let sum = 0;
+            for (let j = 0, at = 10 * i; j < 10; j++) sum += matrix[at + j] * x[j]; // which is symmetric
+            g[i] = sum;
+            power += sum * x[i];
+        }
         const r = 1 / power;
         for (let i = 0; i < 10; i++) {
-            w[i] += g[i] * r * error;
-            for (let j = 0; j < 10; j++) matrix[10 * i + j] = (matrix[10 * i + j] - g[i] * g[j] * r) * 1.0005;
+            const gain = g[i];
+            w[i] += gain * r * error;
+            for (let j = i; j < 10; j++) {
+                const found = (matrix[10 * i + j] - gain * g[j] * r) * 1.0005;
+                matrix[10 * i + j] = found;
+                matrix[10 * j + i] = found;
+            }
         }
         this.level = 0.98 * this.level + 0.02 * Math.abs(error);
         return Math.abs(error);
@@ -301,26 +329,31 @@ class Entries {
         const size = first.length;
         [this.counts, this.roots] = [new Float64Array(size).fill(1), new Float64Array(size).fill(1)];
         [this.near, this.far] = [new Float64Array(size), new Float64Array(size)];
-        this.weights = new Uint32Array(size).fill(1);
-        [this.start, this.end] = [0, 0]; // of the entries within reach; all others weigh 1
+        this.weights = new Uint32Array(size);
+        [this.start, this.end] = [0, 0]; // of the entries within reach, which have weights; all others weigh 1
         this.reached = 0; // how many they were, added up over all nodes so far
     }
 
     weigh(p0, s0, p1, s1) {
-        const { near, far, weights, before } = this;
-        weights.fill(1, this.start, this.end);
-        [this.p0, this.s0, this.p1, this.s1] = [p0, s0, p1, s1];
+        const { near, far, weights } = this;
+        this.p0 = p0;
+        this.s0 = s0;
+        this.p1 = p1;
+        this.s1 = s1;
         const reach = 16 / s0;
-        const start = (this.start = before[step(p0 - reach)]);
-        const end = (this.end = before[step(p0 + reach) + 1]);
+        const start = this.before[step(p0 - reach)];
+        const end = this.before[step(p0 + reach) + 1];
+        this.start = start;
+        this.end = end;
         this.reached += end - start;
         this.measure(start, end);
         this.f = this.narrow / sum4(near, start, end);
         this.g = (1 - this.narrow) / sum4(far, start, end);
-        const [f, g] = [this.f * 65536, this.g * 65536];
+        const f = this.f * 65536;
+        const g = this.g * 65536;
         let total = weights.length;
         for (let i = start; i < end; i++) {
-            const more = (near[i] * f + far[i] * g) >>> 0;
+            const more = (near[i] * f + far[i] * g) | 0;
             weights[i] = 1 + more;
             total += more;
         }
@@ -347,17 +380,22 @@ class Entries {
 
     learn(i) {
         this.measure(i, i + 1);
-        const [near, far] = [this.near[i] * this.f, this.far[i] * this.g];
+        const near = this.near[i] * this.f;
+        const far = this.far[i] * this.g;
         this.narrow = 0.96 * (near / (near + far)) + 0.02;
         this.roots[i] = Math.sqrt(++this.counts[i]);
     }
 }
 
 /** The nodes next to node p in φ_d, which turns, or turns back at its ends. */
-function beside(p, width, mirrored) {
-    const last = width - 1;
-    if (!mirrored) return [(p + last) % width, (p + 1) % width];
-    return [p > 0 ? p - 1 : Math.min(1, last), p < last ? p + 1 : Math.max(last - 1, 0)];
+function before(p, width, mirrored) {
+    if (p > 0) return p - 1;
+    return mirrored ? Math.min(1, width - 1) : width - 1;
+}
+
+function after(p, width, mirrored) {
+    if (p < width - 1) return p + 1;
+    return mirrored ? Math.max(width - 2, 0) : 0;
 }
 
 /** Of the first `length` nodes of an axis, those on either side of a place, and the way to the second. */
@@ -383,7 +421,10 @@ function sum(values) {
 }
 
 function sum4(values, first, end) {
-    let [a, b, c, d] = [0, 0, 0, 0];
+    let a = 0;
+    let b = 0;
+    let c = 0;
+    let d = 0;
     let i = first;
     for (; i + 4 <= end; i += 4) {
         a += values[i];
