@@ -276,7 +276,7 @@ def test_bad_files_are_refused_by_every_command(capsys, tmp_path, command, name)
         (
             ["render", "nickel", "-o", "{}/x.png", "--scene", "moon"],
             2,
-            "--scene: expected sphere or statue or still-life or grid, found moon",
+            "--scene: expected sphere or statue or ball or sample or still-life or grid, found moon",
         ),
         (["render", "nickel", "-o", "{}/x.png", "--sampler", "dice"], 2, "--sampler: expected "),
         (["compres"], 2, "compres: expected a command, found none of that name; did you mean compress?"),

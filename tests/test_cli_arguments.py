@@ -89,7 +89,7 @@ def test_alone_it_prints_help(capsys):
     assert err.startswith("error: --frobnicate: expected an option of sommerl, found none of that name")
 
 
-FAR = ["missing", "material", "?!", "", "gold", "view", "x.smrl", "help", "list"]
+FAR = ["missing", "material", "?!", "", "gold", "serve", "x.smrl", "help", "list"]
 
 
 def check_near(word, name, names):

@@ -33,7 +33,7 @@ LINES = {
     "comp": ["compare", "completion", "compress"],
     "compress --target": ["--target-size", "--target-psnr"],
     "compress --rule ": ["paper", "kohonen"],
-    "render --scene s": ["sphere", "statue", "still-life"],
+    "render --scene s": ["sphere", "statue", "sample", "still-life"],
     "paper ": ["table1", "fig5", "fig6", "all"],
     "info ni": ["nix.smrl", "ninth"],
     "compress x -o ni": ["nix.smrl", "ninth"],

@@ -35,6 +35,7 @@ LINES = {
     "fit": ("fit {}/a.smrl --model lambertian --samples 1000 --starts 1", ("`fit`",)),
     "factor": ("factor nickel -o {}/x.fbrdf --lobes 1 --terms 1", ("`factor`",)),
     "plot": ("plot {}/a.smrl -o {}/x.png --kind theta-h", ("`plot`",)),
+    "view": ("view {}/a.smrl -o {}/x.html", ("`view`",)),
     "completion": ("completion bash", ("`completion`",)),
 }
 

@@ -63,6 +63,44 @@ def test_materials_are_put_into_the_scene_in_order(capsys, folder, tmp_path):
     assert result["material"].endswith("(trilinear)")
 
 
+def test_a_view_and_a_light_of_your_own(capsys, tmp_path):
+    """Of the scene's own view, the numbers give its own picture; a light in its place gives another."""
+    rest = "--scene", "sample", "nickel", *SMALL
+
+    def rendered(*options):
+        result = run_json(capsys, "render", *rest, *options, "-o", tmp_path / "x.exr")
+        return result["from"], result["light"], picture(tmp_path / "x.exr")
+
+    own, seen, turned = rendered(), rendered("--from", "0,45"), rendered("--from", "-30,45,0.5")
+    lit = rendered("--from", "0,45", "--light", "180,45")
+    assert (own[0], own[1]) == (None, None)
+    assert seen[:2] == ({"azimuth": 0.0, "elevation": 45.0, "zoom": 1.0}, None)
+    assert turned[0] == {"azimuth": -30.0, "elevation": 45.0, "zoom": 0.5}
+    assert lit[1] == {"azimuth": 180.0, "elevation": 45.0}
+    assert np.allclose(seen[2], own[2], rtol=1e-3)
+    assert not np.allclose(turned[2], own[2], rtol=1e-3)
+    assert not np.allclose(lit[2], own[2], rtol=1e-3)
+
+
+ANGLES = [
+    (["--from", "30"], "--from: expected AZIMUTH,ELEVATION or AZIMUTH,ELEVATION,ZOOM, found 30"),
+    (["--from", "30,nan"], "--from: expected AZIMUTH,ELEVATION or AZIMUTH,ELEVATION,ZOOM, found 30,nan"),
+    (["--from", "30,90"], "--from: elevation: expected -89 to 89, found 90"),
+    (["--from", "0,0,0"], "--from: zoom: expected 0.1 to 10, found 0"),
+    (["--light", "0,0,1"], "--light: expected AZIMUTH,ELEVATION, found 0,0,1"),
+    (["--light", "0,45", "--envmap", __file__], "--light: expected no --envmap beside it, found one"),
+    (["--light", "0,45", "--scene", "still-life"], "still-life: expected no --light, since it has lights of its own"),
+    (["--from", "0,45", "--scene", "still-life"], "still-life: expected no --from, since it has a view of its own"),
+]
+
+
+@pytest.mark.parametrize(("options", "sentence"), ANGLES)
+def test_a_view_or_a_light_that_cannot_be(capsys, tmp_path, options, sentence):
+    status, _, err = run(capsys, "render", "-o", tmp_path / "x.png", *options)
+    assert status == 2
+    assert err.startswith(f"error: {sentence}")
+
+
 def check_folder(capsys, folder, path, names):
     status, out, err = run(capsys, "render", "--scene", "grid", folder, "-o", path, *SMALL)
     assert status == 0

@@ -11,7 +11,7 @@ import sommerl
 PACKAGE = Path(sommerl.__file__).parent
 ROOMS = (
     "system", "reflectance", "models", "factored", "sampling", "compression", "fitting", "formats", "render", "plots",
-    "reproduction", "commands",
+    "viewer", "reproduction", "commands",
 )  # fmt: skip
 
 

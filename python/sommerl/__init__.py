@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .reflectance.table import BrdfTable
     from .render.compress import compress
     from .system.errors import SommerlError
+    from .viewer.notebook import view
 
 __version__ = "0.1.0"
 
@@ -45,6 +46,7 @@ __all__ = [
     "save",
     "threads",
     "train",
+    "view",
 ]
 
 _MODULES = {
@@ -65,6 +67,7 @@ _MODULES = {
     "reciprocal": "reflectance.reciprocal",
     "save": "compression.smrl.file",
     "train": "compression.paper.train",
+    "view": "viewer.notebook",
 }
 
 

@@ -8,7 +8,13 @@ from sommerl.render import scenes
 from sommerl.render.meshes import knot, lathe, load_mesh, vertex_normals
 from sommerl.system.errors import FormatError
 
-MADE = {"finial": scenes.finial, "bowl": scenes.bowl, "vase": scenes.vase, "knot": lambda: knot("knot")}
+MADE = {
+    "finial": scenes.finial,
+    "ball": scenes.material_ball,
+    "bowl": scenes.bowl,
+    "vase": scenes.vase,
+    "knot": lambda: knot("knot"),
+}
 TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
 OUTWARD = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 NORMALS = np.array([[-1, -1, -1], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) / np.array([[3**0.5], [1], [1], [1]])

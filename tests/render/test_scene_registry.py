@@ -13,6 +13,7 @@ from sommerl.render.llvm import mitsuba
 from sommerl.render.meshes import knot
 from sommerl.render.passes import render
 from sommerl.render.scene_registry import SCENES, make_scene
+from sommerl.render.viewpoint import Viewpoint
 from sommerl.sampling.cosine import CosineSampler
 from sommerl.system.errors import OptionError
 
@@ -50,7 +51,7 @@ def test_shapes_and_lamps_come_in_the_order_of_the_description():
 
 def test_the_objects_are_what_carries_the_materials():
     """With black materials, the mask is what no light comes from."""
-    for name in ("statue", "still-life"):
+    for name in ("statue", "ball", "still-life"):
         scene = make_scene(name, [lambertian_table(1e-9)] * SCENES[name].places, size=96)
         image = render(scene, spp=16)
         assert image.pixels[image.mask].mean() < 0.05 * image.pixels[~image.mask].mean()
@@ -109,9 +110,14 @@ def test_scenes_refuse_what_they_do_not_take():
         make_scene("still-life", materials("still-life"), environment=default_environment(16))
     with pytest.raises(OptionError, match="sphere: expected no mesh"):
         make_scene("sphere", materials("sphere"), mesh=knot("knot"))
+    with pytest.raises(OptionError, match="still-life: expected no view"):
+        make_scene("still-life", materials("still-life"), view=Viewpoint(0, 10))
+    for name in ("statue", "ball"):
+        with pytest.raises(OptionError, match=f"{name}: expected a view from above the plane"):
+            make_scene(name, materials(name), view=Viewpoint(20, -30))
     with pytest.raises(OptionError, match="grid: expected 1 material, found 0"):
         make_scene("grid", [])
-    with pytest.raises(OptionError, match="scene: expected sphere, statue, still-life, grid, found cube"):
+    with pytest.raises(OptionError, match="scene: expected sphere, statue, ball, sample, still-life, grid, found cube"):
         make_scene("cube", [])
 
 

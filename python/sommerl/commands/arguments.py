@@ -68,8 +68,8 @@ class WritingArguments(Arguments):
 
 
 def flag(name: str) -> str:
-    """An option as it is typed, of the name of its field."""
-    return f"--{name.replace('_', '-')}"
+    """An option as it is typed, of the name of its field; a word of Python's, like `from_`, ends in an underscore."""
+    return f"--{name.rstrip('_').replace('_', '-')}"
 
 
 @contextmanager
@@ -116,7 +116,7 @@ def _argument(each: Field[Any], hint: Any) -> tuple[tuple[str, ...], dict[str, A
         settings["default"] = each.default
     several = get_origin(hint) is tuple
     if hint is bool:
-        return (*about["short"], flag(each.name)), settings | {"action": "store_true"}
+        return (*about["short"], flag(each.name)), settings | {"action": "store_true", "dest": each.name}
     kind = get_args(hint)[0] if several else _without_none(hint)
     choices = about["choices"] or (get_args(kind) if get_origin(kind) is Literal else None)
     if choices:
@@ -133,7 +133,10 @@ def _argument(each: Field[Any], hint: Any) -> tuple[tuple[str, ...], dict[str, A
         settings |= {"action": "append", "default": []}
     if about["metavar"]:
         settings["metavar"] = about["metavar"]
-    return (*about["short"], flag(each.name)), settings | {"required": each.default is MISSING}
+    return (*about["short"], flag(each.name)), settings | {
+        "required": each.default is MISSING,
+        "dest": each.name,
+    }
 
 
 def _without_none(hint: Any) -> Any:
@@ -163,6 +166,18 @@ def byte_count(text: str) -> int:
     if count.denominator != 1:
         raise ArgumentTypeError(f"expected a number of bytes, like 8000 or 8kB, found {text}")
     return int(count)
+
+
+def several(read: Callable[[str], int]) -> Callable[[str], tuple[int, ...]]:
+    """What reads numbers between commas, of each of which `read` makes one."""
+
+    def all_of(text: str) -> tuple[int, ...]:
+        words = [word.strip() for word in text.split(",")]
+        if not all(words):
+            raise ArgumentTypeError(f"expected numbers between commas, found {text}")
+        return tuple(map(read, words))
+
+    return all_of
 
 
 READERS: dict[Any, Callable[[str], Any]] = {int: whole_number, float: number}

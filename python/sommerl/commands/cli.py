@@ -14,7 +14,7 @@ from ..formats.registry import listed, readable
 from ..models.builtin import NAMES
 from ..system import threads
 from ..system.files import replacing_files
-from . import compare, completion, compress, convert, demo, factor, fit, info, paper, plot, render
+from . import compare, completion, compress, convert, demo, factor, fit, info, paper, plot, render, view
 from .arguments import WritingArguments, read
 from .console import warn
 from .folders import empty_ones_removed
@@ -37,11 +37,12 @@ Examples:
   sommerl info blue.smrl
   sommerl compare blue-metallic-paint.binary blue.smrl
   sommerl render --scene sphere blue.smrl -o blue.png
+  sommerl view blue-metallic-paint.binary blue.smrl
 """
 
 
 # In the order in which help lists them.
-COMMANDS = (demo, compress, info, convert, compare, fit, factor, render, plot, paper, completion)
+COMMANDS = (demo, compress, info, convert, compare, fit, factor, render, plot, view, paper, completion)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -45,7 +45,7 @@ def outcome(command: Callable[[], Mapping[str, Any] | None], *, as_json: bool) -
     try:
         answer = command()
         if as_json and answer is not None:
-            _print_json({**answer, "warnings": warn.told})
+            print_answer(answer)
         sys.stdout.flush()
     except OptionError as error:
         return fail(str(error), 2, as_json=as_json)
@@ -66,6 +66,12 @@ def outcome(command: Callable[[], Mapping[str, Any] | None], *, as_json: bool) -
     except BaseException as error:  # a panic in Rust is no Exception
         return fail(_unexpected(error), 1, as_json=as_json)
     return 0
+
+
+def print_answer(answer: Mapping[str, Any]) -> None:
+    """Prints an answer as JSON, with all warnings so far. A command that then goes on until it is stopped calls it."""
+    _print_json({**answer, "warnings": warn.told})
+    sys.stdout.flush()
 
 
 def fail(message: str, status: int, known: Mapping[str, Any] | None = None, *, as_json: bool = False) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NoReturn
@@ -14,6 +15,12 @@ from .arguments import Arguments, add_to
 
 class Parser(argparse.ArgumentParser):
     """Raises OptionError, one sentence, for what cannot be read."""
+
+    def __init__(self, *args: Any, **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        # By this pattern argparse tells a negative number from an option. Its own one knows no numbers between commas,
+        # as in `--light -30,50`, and there is no public way to another.
+        self._negative_number_matcher = re.compile(r"-\.?\d[^a-z]*$")
 
     def error(self, message: str) -> NoReturn:
         sentence = message.removeprefix("argument ").replace("not allowed with argument", "not allowed beside")

@@ -6,14 +6,11 @@ import math
 import textwrap
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
 from itertools import compress
 from pathlib import Path
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from ..formats.load import load
 from ..plots.contact_sheet import captioned, tiled
@@ -27,10 +24,13 @@ from ..render.meshes import Mesh, load_mesh
 from ..render.metrics import exposure, flip_map, to_srgb8
 from ..render.passes import render_all
 from ..render.scene_registry import SCENES, make_scene
+from ..render.scenes import Surroundings
+from ..render.viewpoint import DirectionalLight, Viewpoint
 from ..sampling import named
 from ..sampling.named import OURS
 from ..sampling.sampler import Sampler
 from ..system.errors import MaterialError, OptionError, SommerlError
+from ..system.first_few import first_few
 from . import answers, console, render_own
 from .checks import check_apart, check_output
 from .compare import distances_of, looked_up_alike
@@ -120,10 +120,23 @@ class Materials:
 
 @dataclass(frozen=True)
 class Setting:
-    """The light and the object of a scene, where the user gave them; None where the scene has its own."""
+    """The light, the object and the view of a scene, where the user gave them; None where the scene has its own."""
 
-    environment: NDArray[np.float32] | None
+    environment: Surroundings | None
     mesh: Mesh | None
+    view: Viewpoint | None
+
+    @property
+    def identity(self) -> dict[str, str]:
+        """By name, what the pixels depend on."""
+        found: dict[str, str] = {}
+        if isinstance(self.environment, DirectionalLight):
+            found["light"] = repr(self.environment)
+        elif self.environment is not None:
+            found["environment"] = content(self.environment)
+        if self.mesh:
+            found["mesh"] = content(self.mesh.positions, self.mesh.faces, self.mesh.normals)
+        return found | ({"view": repr(self.view)} if self.view else {})
 
 
 @dataclass(frozen=True)
@@ -151,11 +164,7 @@ def _render(options: RenderArguments) -> dict[str, Any]:
     materials = Materials(options.lookup)
     pairs, identity, shown = _read_all(pairs, materials, job)
     setting = _setting(job)
-    identity |= {"scene": job.scene, "size": str(job.sampling.size), "sampler": job.sampler}
-    if setting.environment is not None:
-        identity["environment"] = content(setting.environment)
-    if setting.mesh:
-        identity["mesh"] = content(setting.mesh.positions, setting.mesh.faces, setting.mesh.normals)
+    identity |= {"scene": job.scene, "size": str(job.sampling.size), "sampler": job.sampler} | setting.identity
     checkpoint = Checkpoint(
         checkpoint_of(options.output), identity, (job.sampling.size, job.sampling.size), console.warn
     )
@@ -170,6 +179,8 @@ def _render(options: RenderArguments) -> dict[str, Any]:
     result: dict[str, Any] = {"image": str(options.output), "seconds": seconds, "spp": job.sampling.spp}
     result |= {"variant": mitsuba().variant(), "scene": job.scene, "sampler": job.sampler}
     result |= {"material": shown[0]["label"], "resumed": checkpoint.resumed}
+    result |= {"from": asdict(setting.view) if setting.view else None}
+    result |= {"light": asdict(options.light) if options.light else None}
     rows: dict[str, str] = {}
     if comparison:
         _write(outputs["reference"], references, scale, caption)
@@ -185,7 +196,7 @@ def _render(options: RenderArguments) -> dict[str, Any]:
             rows |= distance_rows
     checkpoint.remove()
     if not options.json:
-        rendered = ", ".join(one["label"] for one in shown[:3]) + (f" and {len(shown) - 3} more" if shown[3:] else "")
+        rendered = first_few([one["label"] for one in shown])
         console.say(f"{rendered} → {options.output} ({seconds:.1f} s)")
         if rows:
             console.print_rows(f"{result['candidate']} against {result['reference']}", rows)
@@ -284,17 +295,22 @@ def _check_pixels(job: Job, count: int) -> None:
 
 def _setting(job: Job) -> Setting:
     taken = SCENES[job.scene]
-    mesh, envmap = job.asked.mesh, job.asked.envmap
+    mesh, envmap, light, view = job.asked.mesh, job.asked.envmap, job.asked.light, job.asked.from_
     for option, value, allowed, what in (
         ("--mesh", mesh, taken.mesh, "objects"),
         ("--envmap", envmap, taken.environment, "lights"),
+        ("--light", light, taken.environment, "lights"),
+        ("--from", view, taken.view, "a view"),
     ):
         if value and not allowed:
             raise OptionError(f"{job.scene}: expected no {option}, since it has {what} of its own, found one")
+    if light and envmap:
+        raise OptionError("--light: expected no --envmap beside it, found one")
     loaded = load_mesh(mesh) if mesh else None
     if loaded and loaded.found:
         console.warn(loaded.found)
-    return Setting(environment_of(envmap) if taken.environment else None, loaded)
+    environment = light or (environment_of(envmap) if taken.environment else None)
+    return Setting(environment, loaded, view)
 
 
 def _rendered(
@@ -321,6 +337,7 @@ def _rendered(
             samplers=samplers,
             environment=setting.environment,
             mesh=setting.mesh,
+            view=setting.view,
             size=job.sampling.size,
         )
 

@@ -20,7 +20,17 @@ from .render_arguments import RenderArguments
 from .rendering import LARGEST_SEED, MOST_SPP, goes_on_from
 
 EXTENSION = ".xml"
-WITHOUT = ("scene", "against", "mesh", "envmap", "size", "lookup", "sampler")  # options that a scene file decides
+WITHOUT = (
+    "scene",
+    "against",
+    "mesh",
+    "envmap",
+    "from_",
+    "light",
+    "size",
+    "lookup",
+    "sampler",
+)  # options that a scene file decides
 ONLY = {"variant": "--variant", "define": "-D"}  # options that nothing else takes
 
 FILES = """Scene files:

@@ -114,6 +114,20 @@ class RglBrdf(Brdf):
     def buffers(self) -> dict[str, NDArray[Any]]:
         return self._buffers
 
+    def fields(self) -> dict[str, NDArray[Any]]:
+        """The arrays of an RGL file that holds the same, by name; in RGB, whatever it was read from."""
+        count, shapes, held = len(self._theta_i), self._shapes, self._buffers
+        arrays = {
+            "phi_i": np.zeros(1),
+            "theta_i": self._theta_i,
+            "sigma": held["sigma"].reshape(shapes["sigma"]),
+            "ndf": held["ndf"].reshape(shapes["ndf"]),
+            "vndf": held["vndf"].reshape(1, count, *shapes["vndf"]),
+            "rgb": held["rgb"].reshape(1, count, 3, *shapes["rgb"]),
+        }
+        single = {name: np.ascontiguousarray(array, "<f4") for name, array in arrays.items()}
+        return {"jacobian": np.full(1, self._jacobian, np.uint8), **single}
+
     def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
         f = ops(wi[0])
         upright = wo[0] * wo[0] + wo[1] * wo[1] < NORMAL

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
+from functools import partial
 
 from ..models.builtin import NAMES
 from ..reflectance.brdf import Brdf
@@ -16,7 +14,8 @@ from .environment import default_environment
 from .frame import Scene
 from .meshes import Mesh
 from .passes import DEFAULT_SIZE
-from .scenes import sphere, statue, still_life
+from .scenes import Surroundings, ball, sample, sphere, statue, still_life
+from .viewpoint import Viewpoint
 
 
 @dataclass(frozen=True)
@@ -24,15 +23,16 @@ class Contents:
     """What is put into a scene.
 
     samplers: how directions are drawn, one for each BRDF; for None see `make_bsdf`. environment: radiance
-        (height, width, 3), or None where the scene has lights of its own. mesh: None for the scene's own. size: of the
-        square frame, in pixels.
+        (height, width, 3), or a directional light in its place, or None where the scene has lights of its own. mesh,
+        view: None for the scene's own. size: of the square frame, in pixels.
     """
 
     brdfs: Sequence[Brdf]
     samplers: Sequence[Sampler] | None
-    environment: NDArray[np.float32] | None
+    environment: Surroundings | None
     mesh: Mesh | None
     size: int
+    view: Viewpoint | None = None
 
     @property
     def sampler(self) -> Sampler | None:
@@ -46,7 +46,7 @@ class SceneKind:
 
     summary: what it shows, for help. make: makes it from contents that `make_scene` has checked.
     materials: built-in ones that are shown where the user names none; their number is the scene's.
-    environment, mesh: whether it takes one from the user.
+    environment, mesh, view: whether it takes one from the user; with an environment, a directional light, too.
     each: whether it takes any number of materials and shows each in a picture of its own; `make` then makes the picture
         of one material.
     """
@@ -56,6 +56,7 @@ class SceneKind:
     materials: tuple[str, ...]
     environment: bool = True
     mesh: bool = False
+    view: bool = False
     each: bool = False
 
     @property
@@ -64,15 +65,18 @@ class SceneKind:
         return 1 if self.each else len(self.materials)
 
 
-def _sphere(contents: Contents) -> Scene:
-    assert contents.environment is not None
-    return sphere(contents.brdfs[0], contents.environment, sampler=contents.sampler, size=contents.size)
+def _with(scene: Callable[..., Scene]) -> Callable[[Contents], Scene]:
+    """What makes a scene of one material in an environment."""
+
+    def make(contents: Contents) -> Scene:
+        brdf, sampler = contents.brdfs[0], contents.sampler
+        return scene(brdf, contents.environment, sampler=sampler, view=contents.view, size=contents.size)
+
+    return make
 
 
 def _statue(contents: Contents) -> Scene:
-    assert contents.environment is not None
-    mesh, sampler = contents.mesh, contents.sampler
-    return statue(contents.brdfs[0], contents.environment, mesh=mesh, sampler=sampler, size=contents.size)
+    return _with(partial(statue, mesh=contents.mesh))(contents)
 
 
 def _still_life(contents: Contents) -> Scene:
@@ -81,12 +85,27 @@ def _still_life(contents: Contents) -> Scene:
 
 # In the order in which help and docs list them.
 SCENES: dict[str, SceneKind] = {
-    "sphere": SceneKind("one material on a sphere in the environment", _sphere, ("blue-metallic-paint",)),
+    "sphere": SceneKind(
+        "one material on a sphere in the environment", _with(sphere), ("blue-metallic-paint",), view=True
+    ),
     "statue": SceneKind(
         "one material on a carved figure, or on --mesh, on a grey plane in the environment; global illumination",
         _statue,
         ("blue-metallic-paint",),
         mesh=True,
+        view=True,
+    ),
+    "ball": SceneKind(
+        "one material on a ball with a groove, on a foot, on a grey plane in the environment; global illumination",
+        _with(ball),
+        ("blue-metallic-paint",),
+        view=True,
+    ),
+    "sample": SceneKind(
+        "one material on a flat square, seen at 45 degrees, in the environment",
+        _with(sample),
+        ("blue-metallic-paint",),
+        view=True,
     ),
     "still-life": SceneKind(
         "three: a bowl and a ball, a knot and a ball, a vase and a ball, under area lights of their own, with "
@@ -99,8 +118,9 @@ SCENES: dict[str, SceneKind] = {
         "any number on spheres, each as `sphere` has it, at one exposure, with labels in the PNG; a folder stands for "
         "the material files in it, of which those that cannot be read are named and left out; if no material is given, "
         "all built-in ones",
-        _sphere,
+        _with(sphere),
         NAMES,
+        view=True,
         each=True,
     ),
 }
@@ -111,8 +131,9 @@ def make_scene(
     brdfs: Sequence[Brdf],
     *,
     samplers: Sequence[Sampler] | None = None,
-    environment: NDArray[np.float32] | None = None,
+    environment: Surroundings | None = None,
     mesh: Mesh | None = None,
+    view: Viewpoint | None = None,
     size: int = DEFAULT_SIZE,
 ) -> Scene:
     """A scene of SCENES; of one that shows each material by itself, the picture of one material.
@@ -125,9 +146,10 @@ def make_scene(
     if len(brdfs) != kind.places:
         expected = f"{kind.places} material{'s' if kind.places > 1 else ''}"
         raise OptionError(f"{name}: expected {expected}, found {len(brdfs)}")
-    for what, given, allowed in (("environment", environment, kind.environment), ("mesh", mesh, kind.mesh)):
+    taken = ("environment", environment, kind.environment), ("mesh", mesh, kind.mesh), ("view", view, kind.view)
+    for what, given, allowed in taken:
         if given is not None and not allowed:
             raise OptionError(f"{name}: expected no {what}, since it has its own, found one")
     if kind.environment and environment is None:
         environment = default_environment()
-    return kind.make(Contents(brdfs, samplers, environment, mesh, size))
+    return kind.make(Contents(brdfs, samplers, environment, mesh, size, view))

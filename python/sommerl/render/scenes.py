@@ -12,55 +12,94 @@ from numpy.typing import NDArray
 
 from ..reflectance.brdf import Brdf
 from ..sampling.sampler import Sampler
+from ..system.errors import OptionError
 from .bsdf import make_bsdf
 from .frame import Scene
 from .llvm import mitsuba
 from .meshes import Mesh, knot, lathe
 from .passes import DEFAULT_SIZE
+from .viewpoint import Camera, DirectionalLight, Point, Viewpoint
 
 FILL = 0.9  # of the frame's height, by the sphere
 DISTANCE = 5.0  # of the camera, in radii of the sphere
 BOUNCES = 8  # of light, where there is more than one object
 
-Point = tuple[float, float, float]
+Surroundings = NDArray[np.float32] | DirectionalLight  #: an environment, radiance (height, width, 3), or one light
+
+SPHERE = Camera(
+    (0.0, 0.0, DISTANCE), (0.0, 0.0, 0.0), 2 * math.degrees(math.atan(math.tan(math.asin(1 / DISTANCE)) / FILL))
+)
+STANDING = Camera((0.0, 0.95, 3.4), (0.0, 0.49, 0.0), 19.5)  # before things of unit height on the plane
+LYING = Camera((0.0, 2.2, 2.2), (0.0, 0.0, 0.0), 24.0)  # at 45 degrees
 
 
 def sphere(
-    brdf: Brdf, environment: NDArray[np.float32], *, sampler: Sampler | None = None, size: int = DEFAULT_SIZE
+    brdf: Brdf,
+    environment: Surroundings,
+    *,
+    sampler: Sampler | None = None,
+    view: Viewpoint | None = None,
+    size: int = DEFAULT_SIZE,
 ) -> Scene:
     """One sphere of the material in an environment that is visible behind it.
 
-    environment: radiance (height, width, 3), see `environment.py`. sampler: see `make_bsdf`. size: of the square
-    frame, in pixels.
+    environment: radiance (height, width, 3), see `environment.py`; or a directional light, before black. sampler: see
+    `make_bsdf`. view: None for the scene's own. size: of the square frame, in pixels.
     """
-    fov = 2 * math.degrees(math.atan(math.tan(math.asin(1 / DISTANCE)) / FILL))
-    things = {
-        "environment": _envmap(environment),
-        "object": {"type": "sphere", "bsdf": make_bsdf(brdf, sampler)},
-    }
+    things = {"environment": _light_of(environment), "object": {"type": "sphere", "bsdf": make_bsdf(brdf, sampler)}}
     # A sphere alone sees the environment and nothing else.
-    return _scene(things, ("object",), (0, 0, DISTANCE), (0, 0, 0), fov, size=size, bounces=1)
+    return _scene(things, ("object",), SPHERE.seen_from(view), size=size, bounces=1)
 
 
 def statue(
     brdf: Brdf,
-    environment: NDArray[np.float32],
+    environment: Surroundings,
     *,
     mesh: Mesh | None = None,
     sampler: Sampler | None = None,
+    view: Viewpoint | None = None,
     size: int = DEFAULT_SIZE,
 ) -> Scene:
     """A mesh of the material, scaled to unit size, on a grey plane in an environment: global illumination.
 
-    mesh: see `meshes.load_mesh`; a carved finial if None. The others: see `sphere`.
+    mesh: see `meshes.load_mesh`; a carved finial if None. The others: see `sphere`. Raises OptionError for a view from
+    below the plane.
     """
     figure = (mesh or finial()).standing()
-    things = {
-        "environment": _envmap(environment),
-        "plane": _plane(0.06),
-        "statue": figure.shape(make_bsdf(brdf, sampler)),
-    }
-    return _scene(things, ("statue",), (0.0, 0.95, 3.4), (0.0, 0.49, 0.0), 19.5, size=size, bounces=BOUNCES)
+    return _standing("statue", figure, brdf, environment, sampler, view, size)
+
+
+def ball(
+    brdf: Brdf,
+    environment: Surroundings,
+    *,
+    sampler: Sampler | None = None,
+    view: Viewpoint | None = None,
+    size: int = DEFAULT_SIZE,
+) -> Scene:
+    """A ball of the material on a turned foot, with a groove in which it reflects itself, as `statue` has its mesh.
+
+    The arguments: see `statue`.
+    """
+    return _standing("ball", material_ball(), brdf, environment, sampler, view, size)
+
+
+def sample(
+    brdf: Brdf,
+    environment: Surroundings,
+    *,
+    sampler: Sampler | None = None,
+    view: Viewpoint | None = None,
+    size: int = DEFAULT_SIZE,
+) -> Scene:
+    """A flat square of the material, 1 wide, that lies in the environment and faces up, seen at 45 degrees.
+
+    The arguments: see `sphere`.
+    """
+    lying = mitsuba().ScalarTransform4f().rotate([1, 0, 0], -90).scale(0.5)
+    square = {"type": "rectangle", "to_world": lying, "bsdf": make_bsdf(brdf, sampler)}
+    things = {"environment": _light_of(environment), "sample": square}
+    return _scene(things, ("sample",), LYING.seen_from(view), size=size, bounces=1)
 
 
 def still_life(brdfs: Sequence[Brdf], *, samplers: Sequence[Sampler] | None = None, size: int = DEFAULT_SIZE) -> Scene:
@@ -86,7 +125,8 @@ def still_life(brdfs: Sequence[Brdf], *, samplers: Sequence[Sampler] | None = No
         "rim": _light((2.9, 1.7, -1.0), (0, 0.5, 0), (0.4, 1.3), (6.0, 6.6, 7.5)),
         "front": _light((1.6, 2.4, 3.6), (0, 0.4, 0), (0.5, 0.5), (5.0, 5.0, 5.0)),
     }
-    return _scene(things, tuple(objects), (0.0, 1.75, 4.6), (0.04, 0.4, 0.0), 25.5, size=size, bounces=BOUNCES)
+    camera = Camera((0.0, 1.75, 4.6), (0.04, 0.4, 0.0), 25.5)
+    return _scene(things, tuple(objects), camera, size=size, bounces=BOUNCES)
 
 
 @cache
@@ -106,6 +146,21 @@ def finial() -> Mesh:
     return lathe("statue", [*foot, *stem, *body, *ball], rows=240, columns=200, relief=scales)
 
 
+@cache
+def material_ball() -> Mesh:
+    """A ball of radius 0.42 on a turned foot, 1 high, with a groove below its equator."""
+    foot = [(0, 0), (0.3, 0), (0.3, 0), (0.3, 0.035), (0.3, 0.035), (0.2, 0.06), (0.12, 0.1), (0.12, 0.14)]
+
+    def around(*degrees: float, depth: float = 0.0) -> list[tuple[float, float]]:
+        """Points of the ball, or below its surface, at angles from its lowest point."""
+        radius = 0.42 - depth
+        return [(radius * math.sin(a), 0.58 - radius * math.cos(a)) for a in np.radians(degrees)]
+
+    below, above = around(*range(20, 61, 10), 68, 68), around(78, 78, *range(90, 181, 10))
+    outline = [*foot, *below, *around(69, 73, 77, depth=0.06), *above]
+    return lathe("ball", outline, rows=200, columns=160)
+
+
 def bowl() -> Mesh:
     """A bowl with a rim, 1 wide."""
     outside = [(0, 0), (0.2, 0), (0.2, 0), (0.2, 0.03), (0.42, 0.1), (0.5, 0.33), (0.5, 0.33)]
@@ -120,17 +175,31 @@ def vase() -> Mesh:
     return lathe("vase", outside + inside, rows=260, columns=160)
 
 
-def _scene(
-    things: Mapping[str, Any],
-    objects: tuple[str, ...],
-    origin: Point,
-    target: Point,
-    fov: float,
-    *,
+def _standing(
+    name: str,
+    mesh: Mesh,
+    brdf: Brdf,
+    environment: Surroundings,
+    sampler: Sampler | None,
+    view: Viewpoint | None,
     size: int,
-    bounces: int,
 ) -> Scene:
-    """things: everything but camera and integrator. fov: of the square frame [degrees]."""
+    """A mesh of unit height on the grey plane."""
+    camera = STANDING.seen_from(view)
+    if camera.origin[1] <= 0:
+        raise OptionError(
+            f"{name}: expected a view from above the plane, found one from {-camera.origin[1]:.2g} below it"
+        )
+    things = {
+        "environment": _light_of(environment),
+        "plane": _plane(0.06),
+        name: mesh.shape(make_bsdf(brdf, sampler)),
+    }
+    return _scene(things, (name,), camera, size=size, bounces=BOUNCES)
+
+
+def _scene(things: Mapping[str, Any], objects: tuple[str, ...], camera: Camera, *, size: int, bounces: int) -> Scene:
+    """things: everything but camera and integrator."""
     mi = mitsuba()
     film = {
         "type": "hdrfilm",
@@ -139,10 +208,11 @@ def _scene(
         "rfilter": {"type": "box"},  # the one filter whose result is the same, bit for bit, every time
         "pixel_format": "rgb",
     }
-    camera = {
+    look = mi.ScalarTransform4f().look_at(origin=list(camera.origin), target=list(camera.target), up=[0, 1, 0])
+    sensor = {
         "type": "perspective",
-        "fov": fov,
-        "to_world": mi.ScalarTransform4f().look_at(origin=list(origin), target=list(target), up=[0, 1, 0]),
+        "fov": camera.fov,
+        "to_world": look,
         "film": film,
         "sampler": {"type": "independent"},
     }
@@ -151,11 +221,14 @@ def _scene(
     # Each thing is made first: from one description, Mitsuba makes lamps in an order that varies from run to run, and
     # in another order the same seed draws other lamps.
     made = {name: mi.load_dict(thing) if isinstance(thing, dict) else thing for name, thing in things.items()}
-    description = {"type": "scene", "integrator": integrator, "sensor": camera, **made}
+    description = {"type": "scene", "integrator": integrator, "sensor": sensor, **made}
     return Scene(mi.load_dict(description), objects)
 
 
-def _envmap(environment: NDArray[np.float32]) -> dict[str, Any]:
+def _light_of(environment: Surroundings) -> dict[str, Any]:
+    if isinstance(environment, DirectionalLight):
+        direction, irradiance = [-x for x in environment.towards], {"type": "rgb", "value": math.pi}
+        return {"type": "directional", "direction": direction, "irradiance": irradiance}
     return {"type": "envmap", "bitmap": mitsuba().Bitmap(np.ascontiguousarray(environment))}
 
 

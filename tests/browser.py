@@ -1,0 +1,106 @@
+"""The system's Chromium, without a screen: pages are opened in it, and have to be quiet."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from helpers import tool
+from playwright.sync_api import Browser, Page, sync_playwright
+
+# Pictures are drawn by the processor, the same on every machine.
+OPTIONS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking")
+WITHIN = ("data:", "blob:", "about:")  # what is not fetched from anywhere
+DESKTOP, PHONE = {"width": 1280, "height": 800}, {"width": 390, "height": 844}
+READY = "window.sommerl?.first > 0"  # a picture is there
+PATIENCE = 60_000  # ms
+
+
+@dataclass
+class Noise:
+    """What a page did that it should not: errors on its console, uncaught ones, requests for anything but itself."""
+
+    errors: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
+
+    def listen(self, page: Page, allowed: str) -> None:
+        """allowed: the address of the page itself."""
+
+        def asked(request: Any) -> None:
+            if request.url.partition("#")[0] != allowed and not request.url.startswith(WITHIN):
+                self.requests.append(request.url)
+
+        page.on("console", lambda said: self.errors.append(said.text) if said.type == "error" else None)
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+        page.on("crash", lambda _: self.errors.append("the page has crashed"))
+        page.context.on("request", asked)
+
+
+def check_quiet(noise: Noise) -> None:
+    assert noise.errors == []
+    assert noise.requests == []
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Browser]:
+    """One browser for all tests of a process. Where there is none, they are skipped, but not in .ci/run."""
+    path = tool("chromium")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=list(OPTIONS))
+        yield browser
+        browser.close()
+
+
+Browse = Callable[..., Page]
+
+
+@pytest.fixture
+def browse(chromium: Browser, tmp_path: Path) -> Iterator[Browse]:
+    """Opens a page: browse(its HTML, its file or its address, ready=…, **options of Playwright's contexts).
+
+    ready: an expression of JavaScript that becomes true. Each page has a profile of its own. A test fails at its end if
+    one of them was not quiet.
+    """
+    contexts: list[Any] = []
+    noises: list[Noise] = []
+
+    def browse(shown: str | Path, *, ready: str = READY, viewport: Any = DESKTOP, **options: Any) -> Page:
+        context = chromium.new_context(viewport=viewport, **options)
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(PATIENCE)
+        address = _address(shown, tmp_path, len(contexts))
+        noise = Noise()
+        noises.append(noise)
+        noise.listen(page, address.partition("#")[0])
+        page.goto(address)
+        wait_until(page, ready)
+        return page
+
+    yield browse
+    for context in contexts:
+        context.close()
+    for noise in noises:
+        check_quiet(noise)
+
+
+def wait_until(page: Page, ready: str) -> None:
+    """Waits for an expression of JavaScript to be true. (Playwright's own way needs `eval` where it has to wait.)"""
+    end = time.monotonic() + PATIENCE / 1000
+    while not page.evaluate(ready):
+        assert time.monotonic() < end, f"{ready}: not so after {PATIENCE / 1000:.0f} s"
+        page.wait_for_timeout(20)
+
+
+def _address(shown: str | Path, folder: Path, number: int) -> str:
+    if isinstance(shown, str) and shown.startswith(("http://", "file://")):
+        return shown
+    if isinstance(shown, str):
+        path = folder / f"page-{number}.html"
+        path.write_text(shown, "utf-8")
+        shown = path
+    return shown.resolve().as_uri()

@@ -1,0 +1,42 @@
+"""A page of materials whose shaders are asked for what they calculate."""
+
+from contextlib import contextmanager
+
+import numpy as np
+from browser import READY, Noise, check_quiet, wait_until
+
+from sommerl.viewer.held import held
+from sommerl.viewer.page import page
+
+INTERPOLATED = 1e-2  # the relative difference that a shader may have
+
+
+@contextmanager
+def shaders(chromium, folder, materials):
+    """Gives what the shaders of a page with these materials find, by name, for pairs of directions (float32)."""
+    path, names = folder / "page.html", list(materials)
+    path.write_text(page([held(made, name) for name, made in materials.items()]), "utf-8")
+    context, noise = chromium.new_context(), Noise()
+    shown = context.new_page()
+    noise.listen(shown, path.as_uri())
+    shown.goto(path.as_uri())
+    wait_until(shown, READY)
+
+    def ask(name, pairs, what="brdf"):
+        given = [names.index(name), *(w.reshape(-1).tolist() for w in pairs), what]
+        found = shown.evaluate("(given) => window.sommerl.evaluate(...given)", given)
+        return np.array(found, float).reshape(-1, 3)
+
+    yield ask
+    context.close()
+    check_quiet(noise)
+
+
+def close(found, wanted, most):
+    """Pairs whose colours differ by at most such a part of the brightest channel."""
+    size = np.maximum(np.abs(wanted).max(axis=-1), 1e-9)
+    return np.abs(found - wanted).max(axis=-1) <= most * size
+
+
+def check_interpolated(found, made, pairs):
+    assert close(found, made.eval(*pairs), INTERPOLATED).all()
