@@ -76,7 +76,7 @@ function compare(app) {
     const view = switches("Picture", VIEWS, state.view, (value) => app.change({ view: value }));
     const gain = slider({ min: 0, max: 5, step: 1, value: Math.log2(state.gain) }, (x) => `× ${2 ** x}`, (x) => app.change({ gain: 2 ** x }));
     const row = labelled("Difference", gain.input, gain.said);
-    const figures = make("p", { id: "figures", className: "figures", });
+    const figures = make("p", { id: "figures", className: "figures" });
     const element = section("Compare", view, row, figures);
     return {
         element,

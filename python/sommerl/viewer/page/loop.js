@@ -77,7 +77,7 @@ export class Loop {
         const { state, picture } = this;
         this.expose();
         if (!this.marked) this.mark();
-        if (!moving) this.compare(most);
+        if (!moving || state.view === "flip") this.compare(most);
         picture.show(state);
         this.stale = false;
         const paths = picture.count >= most ? `${most} paths a pixel` : `${picture.count} of ${most} paths a pixel`;

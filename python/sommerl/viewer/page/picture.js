@@ -6,7 +6,7 @@ import { SHADERS } from "./shaders.js";
 import { TONES, VIEWS } from "./state.js";
 import { SCENES } from "./camera.js";
 
-const BEHIND = 0.13;
+const BEHIND = 0.13; // grey in sRGB, behind an object that is alone: its unlit side is black
 const [PERCENTILE, EXPOSED_TO] = [0.9, 0.6]; // as `sommerl render` exposes: that share of the object's pixels is at most so bright
 
 export class Picture {
@@ -92,8 +92,10 @@ export class Picture {
         const [uView, uTone] = [VIEWS, TONES].map((all, i) => all.findIndex(([name]) => name === (i ? state.tone : view)));
         const scale = (state.scale || 1) * 2 ** state.stops;
         const empty = !into.framebuffer && !state.environment && !SCENES[state.scene].plane;
-        const more = { uPlace: [into.left ?? 0, 0], uFiner: [a.width / into.width, a.height / into.height], uMarks: this.used && !into.framebuffer ? this.usedBy + 1 : 0, uBehind: empty ? BEHIND : 0 };
+        const marks = this.used && !into.framebuffer ? this.usedBy + 1 : 0;
+        const more = { uPlace: [into.left ?? 0, 0], uMarks: marks, uBehind: empty ? BEHIND : 0 };
         set(gl, display, { uView, uTone, uSplit: state.split * a.width, uExposure: scale, uGain: state.gain, ...more });
+        set(gl, display, { uFiner: [a.width / into.width, a.height / into.height] });
         draw(gl, into);
     }
 
