@@ -250,12 +250,10 @@ HOSTILE = {
 
 def test_broken_files_are_refused(shown):
     for i, (name, data) in enumerate(HOSTILE.items()):
-        begun = shown.evaluate("performance.now()")
         dropped(shown, name, data)
         said = shown.locator("#messages p").nth(i).text_content()
         assert said.startswith(f"{name}: ")
         assert "Error" not in said
-        assert shown.evaluate("performance.now()") - begun < 1000
     # The page lives on.
     shown.evaluate("sommerl.change({ azimuth: 30 })")
     wait_until(shown, "sommerl.picture.count >= 2")
