@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import glob
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from ..formats import registry
 from ..formats.load import load
@@ -13,6 +14,8 @@ from ..formats.names import split_member
 from ..models.builtin import NAMES
 from ..system.errors import MaterialError, SommerlError
 from .console import warn
+
+Read = TypeVar("Read")
 
 
 def stem(source: str) -> str:
@@ -30,16 +33,25 @@ def expanded(given: Iterable[str]) -> list[str]:
 
 
 def readable(sources: Iterable[str], given: Sequence[str]) -> list[str]:
-    """Those of `sources` that can be read. Each is read now, so that a bad one is found before hours of work.
+    """Those of `sources` that can be read. Each is read now, so that a bad one is found before hours of work."""
+
+    def checked(source: str) -> str:
+        load(source)
+        return source
+
+    return read_all(sources, given, checked)
+
+
+def read_all(sources: Iterable[str], given: Sequence[str], read: Callable[[str], Read]) -> list[Read]:
+    """What `read` makes of each of `sources`.
 
     One that was named itself has to be readable, or its error is raised; of a folder or a pattern, one that is not is
     left out with a warning. given: what was named, as `expanded` takes it.
     """
-    kept: list[str] = []
+    kept: list[Read] = []
     for source in sources:
         try:
-            load(source)
-            kept.append(source)
+            kept.append(read(source))
         except SommerlError as error:
             if source in given:
                 raise

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from threading import Thread
 from typing import Any
 
 from ..formats.load import load
-from ..system.errors import MaterialError, OptionError, SommerlError
+from ..system.errors import MaterialError, OptionError
 from ..system.files import atomic_write
 from ..system.first_few import first_few
 from ..system.interrupt import hold_interrupts
@@ -20,7 +21,7 @@ from ..viewer.versions import Source, Version, asked
 from . import answers, console
 from .arguments import Material, WritingArguments, byte_count, named_as_typed, option, positional, several, whole_number
 from .checks import check_output, check_range
-from .inputs import expanded, labels, stem
+from .inputs import expanded, labels, read_all, stem
 from .outcome import print_answer
 from .parser import add_command
 
@@ -107,8 +108,7 @@ def _versions(options: ViewArguments) -> list[Version]:
 def _references(options: ViewArguments, versions: Sequence[Version]) -> tuple[list[str], list[Held]]:
     """The names of the materials, and what the page holds of each, without its versions.
 
-    Each is read once, before any is compressed, and only what the page holds is kept. One of a folder or a pattern that
-    cannot be read is left out with a warning; the error of one that was named is raised.
+    Each is read once, before any is compressed, and only what the page holds is kept.
     """
     found = expanded(options.materials)
     if options.output:
@@ -116,16 +116,7 @@ def _references(options: ViewArguments, versions: Sequence[Version]) -> tuple[li
     again = next((source for source in found if found.count(source) > 1), None)
     if again:
         raise OptionError(f"MATERIAL: expected different ones, found {again} twice")
-    kept: list[Held] = []
-    for source in found:
-        try:
-            kept.append(_reference(source, versions))
-        except SommerlError as error:
-            if source in options.materials:
-                raise
-            console.warn(f"{error}; it is left out")
-    if not kept:
-        raise MaterialError(f"{options.materials[0]}: expected materials, found none that can be read")
+    kept = read_all(found, options.materials, partial(_reference, versions=versions))
     names = [one.label for one in kept]
     made = labels([one.name for one in kept], names)
     return names, [replace(one, label=label, group=label) for one, label in zip(kept, made, strict=True)]

@@ -37,9 +37,12 @@ export const START = {
     stops: 0, tone: "linear",
 };
 
+function short(x) {
+    return String(Math.round(x * 100) / 100);
+}
+
 /** What follows the # of the address. */
 export function written(state) {
-    const short = (x) => String(Math.round(x * 100) / 100);
     const fields = {
         a: state.a, b: state.b, view: state.view, split: short(state.split), gain: state.gain, scene: state.scene,
         from: [state.azimuth, state.elevation, state.zoom].map(short).join(), light: state.environment ? "environment" : state.light.map(short).join(),
@@ -88,7 +91,6 @@ export function read(text, count) {
 export function command(state, names, size, envmap = "") {
     const dashed = (text) => (text.startsWith("-") ? `./${text}` : text); // or it would be an option
     const quoted = (text) => (/^[\w./:-]+$/.test(text) ? dashed(text) : `'${dashed(text).replaceAll("'", "'\\''")}'`);
-    const short = (x) => String(Math.round(x * 100) / 100);
     const shown = state.view === "b" ? names.at(-1) : names[0];
     const both = names.length > 1 && state.view !== "b";
     const words = ["sommerl render", quoted(both ? names[1] : shown), ...(both ? ["--against", quoted(names[0])] : []), "--scene", state.scene];
