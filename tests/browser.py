@@ -88,6 +88,19 @@ def browse(chromium: Browser, tmp_path: Path) -> Iterator[Browse]:
         check_quiet(noise)
 
 
+_GO = """
+(fragment) => new Promise((done) => {
+    addEventListener("hashchange", done, { once: true });
+    location.hash = fragment;
+}).then(() => null)
+"""
+
+
+def go(page: Page, fragment: str) -> None:
+    """Changes the fragment of the page's address, and waits until the page has read it."""
+    page.evaluate(_GO, fragment)
+
+
 def wait_until(page: Page, ready: str) -> None:
     """Waits for an expression of JavaScript to be true. (Playwright's own way needs `eval` where it has to wait.)"""
     end = time.monotonic() + PATIENCE / 1000

@@ -2,13 +2,14 @@
 
 import base64
 import io
+import json
 import re
 import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import DESKTOP, PHONE, wait_until
+from browser import DESKTOP, PHONE, READY, go, wait_until
 from helpers import must_fail
 from PIL import Image
 
@@ -34,14 +35,6 @@ def html():
 @pytest.fixture
 def shown(browse, html):
     return browse(html, viewport=SMALL)
-
-
-GO = """
-(fragment) => new Promise((done) => {
-    addEventListener("hashchange", done, { once: true });
-    location.hash = fragment;
-}).then(() => null)
-"""
 
 
 def state(shown):
@@ -136,7 +129,7 @@ def test_the_address_holds_the_view(browse, html, shown):
     other = browse(html, viewport=SMALL)
 
     def check(fragment):
-        other.evaluate(GO, fragment)
+        go(other, fragment)
         found = state(other)
         assert {name: value for name, value in found.items() if name != "scale"} == {
             name: value for name, value in expected.items() if name != "scale"
@@ -151,7 +144,7 @@ def test_the_address_holds_the_view(browse, html, shown):
 @pytest.mark.parametrize("view", ["split", "side", "difference", "flip"])
 def test_ways_to_compare(shown, view):
     shown.evaluate("view => sommerl.change({ b: 1, view })", view)
-    wait_until(shown, "sommerl.figures && sommerl.picture.films.length === 2")
+    wait_until(shown, f"sommerl.figures && (sommerl.figures.flip !== null) === {json.dumps(view == 'flip')}")
     said = shown.text_content("#figures")
     assert "PSNR of this view" in said
     assert ("FLIP" in said) == (view == "flip")
@@ -290,3 +283,17 @@ def test_a_long_name_is_wrapped(browse, html):
     shown = browse(html, viewport={"width": 320, "height": 600})
     dropped(shown, f"{'long' * 50}.smrl", FILE.read_bytes())
     assert shown.evaluate("document.documentElement.scrollWidth") <= 320
+
+
+def test_a_material_that_is_broken_in_the_page(browse, html):
+    """The page says so each time that it is chosen, and goes on showing what it showed."""
+    data = held(load(FILE), "gold", name=str(FILE)).packed()["data"]
+    shown = browse(html.replace(data, data[:40] + "AAAA" + data[44:]), viewport=SMALL, ready="window.sommerl?.state")
+    shown.evaluate("sommerl.change({ a: 1 })")
+    wait_until(shown, READY)
+    before = shown.locator("#messages p").count()
+    for times in (1, 2):
+        shown.evaluate("sommerl.change({ a: 0 })")
+        wait_until(shown, "sommerl.state.a === 1")
+        assert shown.locator("#messages p").count() == before + times
+    assert "gold" in shown.locator("#messages p").last.text_content()

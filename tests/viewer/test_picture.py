@@ -7,7 +7,7 @@ from pathlib import Path
 import flip_evaluator
 import numpy as np
 import pytest
-from browser import wait_until
+from browser import go, wait_until
 from helpers import must_fail
 from PIL import Image
 from scipy.spatial import cKDTree
@@ -38,7 +38,7 @@ def opened(browse, materials, fragment=""):
     html = page([held(brdf, f"{brdf.name} {i}") for i, brdf in enumerate(materials)])
     shown = browse(html, viewport={"width": 400, "height": 600})
     if fragment:
-        shown.evaluate("fragment => { location.hash = fragment }", fragment)
+        go(shown, fragment)
     return shown
 
 
@@ -208,13 +208,19 @@ def test_figures(browse, materials):
 
 def test_what_is_saved_is_what_is_shown(browse, materials):
     """In A's picture exposed as `sommerl render` exposes, the object's 90th percentile is 0.6 linear."""
-    shown = opened(browse, materials)
+    shown = opened(browse, materials, "view=a")
     wait_until(shown, "sommerl.picture.count === 16 && sommerl.picture.canvas.width > 300")
-    data = shown.evaluate("() => { sommerl.picture.show(sommerl.state); return sommerl.canvas.toDataURL() }")
+    # At once: between two calls, the page might have begun another picture.
+    data, linear, shown_scale = shown.evaluate(
+        """() => {
+            sommerl.picture.show(sommerl.state);
+            return [sommerl.canvas.toDataURL(), sommerl.onCanvas(), sommerl.state.scale];
+        }"""
+    )
     pixels = np.array(Image.open(io.BytesIO(base64.b64decode(data.partition(",")[2]))).convert("RGB"))
-    linear = np.array(shown.evaluate("() => sommerl.onCanvas()")).reshape(*pixels.shape[:2], 4)[::-1]
+    linear = np.array(linear).reshape(*pixels.shape[:2], 4)[::-1]
     mask = linear[..., 3] >= 0.5
     scale = exposure(linear[..., :3], mask)
-    assert shown.evaluate("sommerl.state.scale") == pytest.approx(scale, rel=0.01)
+    assert shown_scale == pytest.approx(scale, rel=0.01)
     expected = to_srgb8(linear[..., :3] * scale)[linear[..., 3] == 1]
     assert np.abs(expected.astype(int) - pixels[linear[..., 3] == 1]).max() <= 2

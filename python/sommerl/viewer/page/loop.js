@@ -53,7 +53,7 @@ export class Loop {
         if (this.fit()) this.restart(); // which has emptied the canvas: what is coarse is there soon
         const numbers = traced(state);
         const moving = pace.isMoving(now);
-        const bounces = moving && !state.environment ? 0 : 1;
+        const bounces = moving && !state.environment && !picture.renderer.isPlain(state, 1) ? 0 : 1;
         if (!this.store.has(numbers, state, bounces)) return;
         const resolution = moving ? pace.resolution : 1;
         const other = resolution !== this.resolution || bounces !== this.bounces;

@@ -77,6 +77,7 @@ class App {
         Object.assign(state, values);
         if (state.b < 0) state.view = "a";
         if (state.a !== before.a && !("scale" in values)) state.scale = 0;
+        for (const which of ["a", "b"]) if (state[which] !== before[which]) this.store.retry(state[which]);
         this.loop.update(before);
         this.tell();
         clearTimeout(this.writing);

@@ -12,6 +12,7 @@ export class Store {
         this.prepared = new Map(); // the same on the GPU
         this.meshes = new Map(); // by scene
         this.made = new Map(); // promises, by what is made
+        this.failed = new Set(); // of these, what could not be made
     }
 
     /** Whether there is all that a picture of these materials needs; the rest is asked for, and what a still picture will need. */
@@ -53,8 +54,19 @@ export class Store {
     }
 
     once(what, make) {
-        if (!this.made.has(what)) this.made.set(what, make());
+        if (!this.made.has(what)) {
+            const promise = make();
+            promise.catch(() => this.failed.add(what));
+            this.made.set(what, promise);
+        }
         return this.made.get(what);
+    }
+
+    /** Lets what could not be made of a material be tried once more, when it is chosen again. */
+    retry(number) {
+        for (const what of [`material ${number}`, `sampler ${number}`]) {
+            if (this.failed.delete(what)) this.made.delete(what);
+        }
     }
 
     /** The decoded material. Throws an Error. */
