@@ -25,10 +25,14 @@ RECIPROCAL, MIRRORED = (
 FIELDS = [[0, 30, 180], [0, 1, 1], [[0, 180], [0, 180]], [[0, 90], [0]], [-1, 2], [[0, 1], [0, 1]], False, False]
 NODES = 8
 BITS = [np.zeros(NODES, np.uint16), np.ones(NODES, np.uint16)]
-SWEEP = [
-    *(np.array([0.0, 1.0]), np.ones((2, 3)), np.arange(NODES + 1, dtype=np.int32), np.arange(NODES, dtype=np.int32)),
-    *(np.ones(NODES), np.ones((NODES, 3)), 0.1),
+EQUATIONS = [
+    np.arange(NODES + 1, dtype=np.int32),
+    np.arange(NODES, dtype=np.int32),
+    np.ones(NODES),
+    np.ones((NODES, 3)),
 ]
+SWEEP = [np.array([0.0, 1.0]), np.ones((2, 3)), _core.NormalEquations(*EQUATIONS), 0.1]
+SAMPLES = [np.sort(RNG.random((50, 3)) * 180, axis=0), RNG.random(50), RNG.random((50, 3))]
 
 LEARNER = [F32, np.arange(40, dtype=np.uint32), F32[:20].copy(), "kohonen", 5, "boxes", "portable", False]
 PRESENT = [0, 40, 0.5, np.array([1, 0.5], np.float32)]
@@ -42,6 +46,16 @@ def presented(*arguments):
 
 def swept(*arguments):
     return _core.NodePalette(*FIELDS).sweep(*(np.copy(each) for each in BITS), *arguments)
+
+
+def equations(*arguments):
+    made = _core.NormalEquations(*arguments)
+    return made.right, made.squares, made.diagonal()
+
+
+def equations_of(*arguments):
+    made = _core.NormalEquations.of(*arguments)
+    return made.right, made.squares, made.diagonal()
 
 
 def in_cells(*arguments):
@@ -72,6 +86,14 @@ CALLS = {
     "decode-mirrored": (_core.NodePalette.decode, [whole(FOLDED), False, True, 2, None]),
     "decode-1": (_core.NodePalette.decode, [whole(MADE, 1), True, False, 1, None]),
     "sweep": (swept, SWEEP),
+    "line-errors": (_core.line_errors, [5, RNG.random((35, 3)), RNG.random(35), "portable", 2]),
+    "equations": (equations, EQUATIONS),
+    "equations-of": (equations_of, [*FIELDS[:4], *SAMPLES, False, False, 2]),
+    "held": (lambda *given: _core.NormalEquations(*EQUATIONS).held(*given).right, [np.ones((NODES, 3)), 0.1]),
+    "with-right": (lambda right: _core.NormalEquations(*EQUATIONS).with_right(right).right, [np.ones((NODES, 3))]),
+    "solved": (_core.NormalEquations(*EQUATIONS).solved, [np.zeros((NODES, 3)), 1e-3, 5]),
+    "product": (_core.NormalEquations(*EQUATIONS).product, [np.ones((NODES, 3))]),
+    "entries": (_core.NormalEquations(*EQUATIONS).between_entries, [BITS[1], np.ones((NODES, 2)), 2]),
 }
 HUGE = (0, 1, 2, 3, 255, 256, 65536, 2**31, 2**32 - 1, 2**32, 2**63 - 1, 2**63, 2**64 - 1, -1)
 

@@ -115,18 +115,14 @@ class NodePalette:
         shape: NDArray[np.uint16],
         gain_values: NDArray[np.float64],
         shape_values: NDArray[np.float64],
-        starts: NDArray[np.int32],
-        columns: NDArray[np.int32],
-        values: NDArray[np.float64],
-        right: NDArray[np.float64],
+        equations: NormalEquations,
         price: float | None,
     ) -> float:
         """Gives each node in turn, in place, the gain and the shape that cost the least in error and bits; returns the
         bits of the indices.
 
-        gain_values (G,), shape_values (S, 3): what the codes stand for. starts (nodes + 1,), columns, values: H, sparse
-        and by rows. right: b, (nodes, 3). Half the error of values z is zᵀHz/2 − bᵀz for each channel. price: of a bit,
-        as error; None changes nothing. Raises ValueError for what does not fit.
+        gain_values (G,), shape_values (S, 3): what the codes stand for. equations: of the nodes. price: of a bit, as
+        error; None changes nothing. Raises ValueError for what does not fit.
         """
 
     @property
@@ -233,3 +229,83 @@ class NodeLookup:
         array was changed after `__init__`. simd and threads change nothing but the time. Raises ValueError for
         directions that do not fit.
         """
+
+def line_errors(
+    places: int,
+    y: NDArray[np.float64],
+    weight: NDArray[np.float64],
+    simd: str | None = None,
+    threads: int | None = None,
+) -> NDArray[np.float64]:
+    """The error of linear interpolation between each two places on an axis, (places, places): at [i, j], the weighted
+    squared error at all places between i and j, summed over lines along the axis; infinite unless i < j.
+
+    y: (places · lines, 3) and weight: (places · lines,), line after line for each place. simd and threads change
+    nothing but the time. Raises ValueError for other shapes.
+    """
+
+class NormalEquations:
+    """The normal equations of a lattice's nodes, H z = b for each channel; zᵀ H z − 2 bᵀ z + squares is the error of
+    values z (nodes, 3). All methods raise ValueError for what does not fit.
+    """
+
+    def __init__(
+        self,
+        starts: NDArray[np.int32],
+        columns: NDArray[np.int32],
+        values: NDArray[np.float64],
+        right: NDArray[np.float64],
+    ) -> None:
+        """starts (nodes + 1,), columns, values: H, symmetric, sparse and by rows. right: b, (nodes, 3)."""
+
+    @staticmethod
+    def of(
+        theta_h: list[int],
+        band: list[int],
+        theta_d: list[list[int]],
+        phi_d: list[list[int]],
+        places: NDArray[np.float64],
+        weights: NDArray[np.float64],
+        targets: NDArray[np.float64],
+        reciprocal: bool = True,
+        mirrored: bool = False,
+        threads: int | None = None,
+    ) -> NormalEquations:
+        """Those of samples: places (n, 3) on the fine grid, of which the first number, θ_h, increases; weights (n,) of
+        their squared errors; and targets (n, 3). theta_h, band, theta_d, phi_d, reciprocal, mirrored: the fields of the
+        `NodeLattice`. threads changes nothing but the time.
+        """
+
+    def held(self, values: NDArray[np.float64], ridge: float) -> NormalEquations:
+        """The same with an error that is larger by ridge times the squared distance from `values` (nodes, 3), of which
+        `squares` leaves out the constant part.
+        """
+
+    def with_right(self, right: NDArray[np.float64]) -> NormalEquations:
+        """The same H with another b (nodes, 3)."""
+
+    def solved(self, start: NDArray[np.float64], tolerance: float, most: int) -> NDArray[np.float64]:
+        """z (nodes, 3), by conjugate gradients from `start`, each channel until its residual is at most tolerance times
+        |b|, or for `most` steps.
+        """
+
+    def product(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
+        """H z, (nodes, 3)."""
+
+    def diagonal(self) -> NDArray[np.float64]:
+        """H's, (nodes,)."""
+
+    def between_entries(
+        self, index: NDArray[np.uint16], factors: NDArray[np.float64], count: int
+    ) -> NDArray[np.float64]:
+        """The equations' matrix where nodes share entries, (count, count): the sum of H_ij f_i · f_j over the nodes i
+        of one entry and j of another. index: each node's entry, (nodes,). factors: f, (nodes, k).
+        """
+
+    @property
+    def right(self) -> NDArray[np.float64]:
+        """b, (nodes, 3)."""
+
+    @property
+    def squares(self) -> float:
+        """The weighted sum of the targets' squares."""

@@ -8,7 +8,7 @@ from sommerl import MERL, BrdfTable, builtin
 from sommerl.compression.compact import lattice_fit as fit
 from sommerl.compression.compact.lattice_fit import Fitter, best_nodes, line_errors
 from sommerl.reflectance.distance import table_metrics
-from sommerl.system.errors import MaterialError, MissingDependencyError
+from sommerl.system.errors import MaterialError
 
 RNG = np.random.default_rng(0)
 A, B = random_directions(3000, 1), random_directions(3000, 2)
@@ -199,12 +199,3 @@ def test_the_same_seed_gives_the_same_lattice(monkeypatch):
 def test_numbers_of_nodes_out_of_range(paint, nodes):
     with pytest.raises(MaterialError, match="nodes: expected 100 to 100000"):
         paint.fit(nodes)
-
-
-def test_scipy_is_asked_for_by_a_sentence(monkeypatch):
-    def missing(name):
-        raise ImportError(name)
-
-    monkeypatch.setattr("sommerl.system.optional.importlib.import_module", missing)
-    with pytest.raises(MissingDependencyError, match=r"install sommerl\[formats\]"):
-        Fitter(builtin("nickel"))

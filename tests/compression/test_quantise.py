@@ -99,7 +99,9 @@ def test_k_means_is_no_other_way_to_the_end(problem):
 
 def test_excess_is_the_difference_of_errors(problem):
     values = problem.best + np.random.default_rng(1).normal(scale=0.1, size=problem.best.shape)
-    error = [float((z * (problem.system @ z) - 2 * problem.right * z).sum()) for z in (problem.best, values)]
+    error = [
+        float((z * (problem.equations.product(z) - 2 * problem.equations.right)).sum()) for z in (problem.best, values)
+    ]
     assert problem.excess(values) == pytest.approx(error[1] - error[0], rel=1e-3)
 
 

@@ -52,13 +52,14 @@ def test_the_source_comes_back_and_better_from_more_nodes(fitter):
 
 def check_solved(problem, values):
     """H z = b, to the tolerance of the conjugate gradients."""
-    assert np.linalg.norm(problem.system @ values - problem.right) < 1e-4 * np.linalg.norm(problem.right)
+    assert np.linalg.norm(problem.equations.product(values) - problem.equations.right) < 1e-4 * np.linalg.norm(
+        problem.equations.right
+    )
 
 
 def test_best_values_solve_the_normal_equations(problem):
     check_solved(problem, problem.best)
     must_fail(check_solved, problem, problem.best * 1.001)
-    assert abs(problem.system - problem.system.T).max() < 1e-9
     assert problem.error > 0
 
 

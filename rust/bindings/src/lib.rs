@@ -3,6 +3,7 @@
 
 mod convert;
 mod learner;
+mod least_squares;
 mod lookup;
 mod node_palette;
 mod quantiser;
@@ -50,5 +51,7 @@ fn _core(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_class::<lookup::CellLookup>()?;
     module.add_class::<lookup::NodeLookup>()?;
     module.add_class::<node_palette::NodePalette>()?;
+    module.add_class::<least_squares::NormalEquations>()?;
+    module.add_function(wrap_pyfunction!(least_squares::line_errors, module)?)?;
     module.add_function(wrap_pyfunction!(simd_paths, module)?)
 }

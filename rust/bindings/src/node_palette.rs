@@ -7,10 +7,11 @@ use pyo3::types::PyBytes;
 use sommerl_codec::{
     CompactMaterial, InstructionSet, Layout, NodeLattice, Palette, check_indices, decode, encode, measure,
 };
-use sommerl_kernels::{Quadratic, Values, sweep};
+use sommerl_kernels::{Values, sweep};
 
 use crate::convert::{instruction_set, invalid, line, rows};
 use crate::guarded;
+use crate::least_squares::NormalEquations;
 
 type Indices<'py> = (Bound<'py, PyArray1<u16>>, Bound<'py, PyArray1<u16>>);
 
@@ -111,32 +112,27 @@ impl NodePalette {
         mut shape: PyReadwriteArray1<u16>,
         gain_values: PyReadonlyArray1<f64>,
         shape_values: PyReadonlyArray2<f64>,
-        starts: PyReadonlyArray1<i32>,
-        columns: PyReadonlyArray1<i32>,
-        values: PyReadonlyArray1<f64>,
-        right: PyReadonlyArray2<f64>,
+        equations: PyRef<NormalEquations>,
         price: Option<f64>,
     ) -> PyResult<f64> {
         guarded(|| {
             let whole = |_| invalid("gain, shape: expected numbers in one piece");
             let (gain, shape) = (gain.as_slice_mut().map_err(whole)?, shape.as_slice_mut().map_err(whole)?);
             check_indices(&self.lattice, &self.palette, gain, shape).map_err(invalid)?;
-            let (starts, columns) = (line(&starts, "starts")?, line(&columns, "columns")?);
-            let (values, right) = (line(&values, "values")?, rows(&right, "right")?);
-            let quadratic = Quadratic { starts, columns, values, right };
-            if !quadratic.fits(self.lattice.nodes()) {
-                return Err(invalid("expected a sparse square matrix with a row for each node"));
+            let equations = &equations.normal;
+            if equations.nodes() != self.lattice.nodes() {
+                return Err(invalid("expected an equation for each node"));
             }
             let (gains, shapes) = (line(&gain_values, "gain_values")?, rows(&shape_values, "shape_values")?);
             if gains.len() != self.palette.gains.len() || shapes.len() != self.palette.shapes.len() {
                 return Err(invalid("expected a value for each gain and each shape"));
             }
-            let numbers = [values, right.as_flattened(), gains, shapes.as_flattened(), price.as_slice()];
+            let numbers = [gains, shapes.as_flattened(), price.as_slice()];
             if !numbers.iter().all(|part| part.iter().all(|x| x.is_finite())) {
                 return Err(invalid("expected finite numbers, found others"));
             }
             let values = Values { gains, shapes };
-            Ok(py.detach(|| sweep(&self.lattice, &self.palette, &values, &quadratic, gain, shape, price)))
+            Ok(py.detach(|| sweep(&self.lattice, &self.palette, &values, equations, gain, shape, price)))
         })
     }
 

@@ -41,6 +41,9 @@ struct Band {
     phi_d: Axis,
 }
 
+/// Nodes, and the shares of each in a value.
+pub type Corners = [(u32, f64); 8];
+
 /// A lattice of nodes, prepared for lookup: tables of the steps of the fine grid.
 pub struct NodeSteps {
     rows: Axis,
@@ -48,6 +51,7 @@ pub struct NodeSteps {
     /// For each step in θ_h the bands of the rows below and after.
     band: [[u8; 2]; 256],
     nodes: usize,
+    theta_h: Vec<u8>,
     reciprocal: bool,
     mirrored: bool,
 }
@@ -73,7 +77,15 @@ impl NodeSteps {
         });
         let band = below(theta_h).map(|row| [band[row], band[row + 1]]);
         let rows = steps(theta_h, |row| base[row]);
-        Some(NodeSteps { rows, bands: bands.collect(), band, nodes: lattice.nodes(), reciprocal, mirrored })
+        Some(NodeSteps {
+            rows,
+            bands: bands.collect(),
+            band,
+            nodes: lattice.nodes(),
+            theta_h: theta_h.clone(),
+            reciprocal,
+            mirrored,
+        })
     }
 
     /// The number of nodes.
@@ -81,24 +93,42 @@ impl NodeSteps {
         self.nodes
     }
 
-    /// The value at a place on the fine grid, added up in the order of `NodeLattice.corners`. step: that it lies in.
+    /// Where each row lies on the fine grid.
+    pub fn theta_h(&self) -> &[u8] {
+        &self.theta_h
+    }
+
+    /// The step of the fine grid that a place lies in, and the nodes about it with their shares, in the order of
+    /// `NodeLattice.corners`.
+    pub fn corners(&self, place: [f64; 3]) -> ([u8; 3], Corners) {
+        let step = place.map(step);
+        (step, self.corners_in(place, step))
+    }
+
     #[inline(always)]
-    fn blend(&self, [x, y, z]: [f64; 3], step: [u8; 3], value: impl Fn(usize) -> [f64; 4]) -> [f64; 4] {
+    fn corners_in(&self, [x, y, z]: [f64; 3], step: [u8; 3]) -> Corners {
         let [h, d, p] = step.map(usize::from);
         let row = &self.rows[h];
         let t = row.share(x);
-        let mut sum = [0.0; 4];
-        for (base, weight, band) in [(row.below, 1.0 - t, self.band[h][0]), (row.after, t, self.band[h][1])] {
+        let of_row = |base: u32, weight: f64, band: u8| {
             let band = &self.bands[band as usize];
             let (d, p) = (&band.theta_d[d], &band.phi_d[p]);
             let (u, v) = (d.share(y), p.share(z));
-            for (line, a) in [(base + d.below, 1.0 - u), (base + d.after, u)] {
-                for (node, b) in [(line + p.below, 1.0 - v), (line + p.after, v)] {
-                    let (weight, value) = (weight * a * b, value(node as usize));
-                    for j in 0..4 {
-                        sum[j] += weight * value[j];
-                    }
-                }
+            let of_line = |line: u32, weight: f64| [(line + p.below, weight * (1.0 - v)), (line + p.after, weight * v)];
+            [of_line(base + d.below, weight * (1.0 - u)), of_line(base + d.after, weight * u)]
+        };
+        let [below, after] = [of_row(row.below, 1.0 - t, self.band[h][0]), of_row(row.after, t, self.band[h][1])];
+        [below[0][0], below[0][1], below[1][0], below[1][1], after[0][0], after[0][1], after[1][0], after[1][1]]
+    }
+
+    /// The value at a place on the fine grid. step: that it lies in.
+    #[inline(always)]
+    fn blend(&self, place: [f64; 3], step: [u8; 3], value: impl Fn(usize) -> [f64; 4]) -> [f64; 4] {
+        let mut sum = [0.0; 4];
+        for (node, weight) in self.corners_in(place, step) {
+            let value = value(node as usize);
+            for j in 0..4 {
+                sum[j] += weight * value[j];
             }
         }
         sum

@@ -3,17 +3,7 @@
 
 use sommerl_codec::{Model, NodeLattice, Palette, Weights, bits_of};
 
-/// Half the error is zᵀHz/2 − bᵀz for each of r, g and b: H sparse, by rows.
-pub struct Quadratic<'a> {
-    /// Where each row of H starts in `columns` and `values`, and where the last one ends.
-    pub starts: &'a [i32],
-    /// The columns of H's numbers.
-    pub columns: &'a [i32],
-    /// H's numbers.
-    pub values: &'a [f64],
-    /// b.
-    pub right: &'a [[f64; 3]],
-}
+use crate::least_squares::Normal;
 
 /// What the codes of a palette stand for.
 pub struct Values<'a> {
@@ -26,13 +16,14 @@ pub struct Values<'a> {
 /// How often gain and shape are chosen in turn. More changes nothing.
 const TURNS: usize = 3;
 
-/// One sweep over all nodes in the order of the stream. Returns the bits of the indices. price: the error that a bit is worth; if
+/// One sweep over all nodes in the order of the stream. Returns the bits of the indices. equations: half the error of values z is
+/// zᵀHz/2 − bᵀz for each channel. price: the error that a bit is worth; if
 /// None, no node changes. Panics if sizes do not fit.
 pub fn sweep(
     lattice: &NodeLattice,
     palette: &Palette,
     values: &Values,
-    quadratic: &Quadratic,
+    equations: &Normal,
     gain: &mut [u16],
     shape: &mut [u16],
     price: Option<f64>,
@@ -52,7 +43,7 @@ pub fn sweep(
             costs(model.shape_weights(), &mut shape_bits);
             let (mut g, mut s) = (gain[i] as usize, shape[i] as usize);
             if let Some(price) = price {
-                let (target, weight) = quadratic.wanted(i, &z);
+                let (target, weight) = equations.wanted(i, &z);
                 let choice = Choice { gains, shapes, gain_bits: &gain_bits, shape_bits: &shape_bits, price };
                 (g, s) = choice.best(target, weight, (g, s));
                 (gain[i], shape[i]) = (g as u16, s as u16);
@@ -66,23 +57,11 @@ pub fn sweep(
     bits
 }
 
-impl Quadratic<'_> {
-    /// Whether H is a square matrix with so many rows, and b has as many.
-    pub fn fits(&self, nodes: usize) -> bool {
-        let Quadratic { starts, columns, values, right } = self;
-        starts.len() == nodes + 1
-            && starts[0] >= 0
-            && starts.is_sorted()
-            && starts[nodes] as usize <= columns.len().min(values.len())
-            && columns.iter().all(|&column| usize::try_from(column).is_ok_and(|column| column < nodes))
-            && right.len() == nodes
-    }
-
+impl Normal {
     /// The value of node i at which the error is least if the other nodes stay; and half the error's second derivative there.
     fn wanted(&self, i: usize, z: &[[f64; 3]]) -> ([f64; 3], f64) {
         let (mut target, mut weight) = (self.right[i], 1e-30);
-        for k in self.starts[i] as usize..self.starts[i + 1] as usize {
-            let (j, h) = (self.columns[k] as usize, self.values[k]);
+        for (j, h) in self.row(i) {
             if j == i {
                 weight = h;
             } else {

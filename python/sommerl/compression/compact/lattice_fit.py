@@ -19,13 +19,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ... import _core
 from ...reflectance.arrays import Triple
 from ...reflectance.brdf import Brdf
 from ...reflectance.distance import sidedness
 from ...reflectance.half_diff import directions
 from ...reflectance.nodes import ABOVE, BELOW, FINE, KNEE, SMALLEST_COSINE, NodeLattice, angles_at, damped
 from ...system.errors import MaterialError
-from ...system.optional import optional
 from .fitted_table import FittedTable
 from .quantise import Problem
 
@@ -78,17 +78,13 @@ class _Grid:
 class Fitter:
     """Prepares a material once, and then fits lattices of any size to it.
 
-    seed: of the lines and directions that are drawn. Raises MissingDependencyError without SciPy, and MaterialError for
-    a black material.
+    seed: of the lines and directions that are drawn. Raises MaterialError for a black material.
     """
 
     def __init__(self, brdf: Brdf, *, seed: int = 0) -> None:
         self._brdf = brdf
         self.folds = folds_of(brdf)
         self._end = FINE + self.folds["mirrored"]  # of the steps in φ_d: the last place is one of its own, or the first
-        self._sparse, self._solvers = (
-            optional(module, "SciPy", "fitting", "formats") for module in ("scipy.sparse", "scipy.sparse.linalg")
-        )
         self._random = np.random.Generator(np.random.PCG64(seed))
         axes = np.arange(FINE + 1.0), np.arange(0.0, FINE + 1, ROWS_EVERY_D), np.arange(0.0, self._end, ROWS_EVERY_P)
         wi, wo, f_damped = self._source(*axes)
@@ -170,11 +166,12 @@ class Fitter:
         y, z = self._random.random((2, DIRECTIONS)) * FINE
         wi, wo = directions(*angles_at(x, y, z, **self.folds))
         above = np.minimum(wi[2], wo[2]) > LOWEST_COSINE
-        self._places = x[above], y[above], z[above]
+        x, y, z = x[above], y[above], z[above]
+        self._places = np.stack([x, y, z], axis=-1)
         wi, wo = ((w[0][above], w[1][above], w[2][above]) for w in (wi, wo))
         f_r = self._brdf.eval(np.stack(wi, axis=-1), np.stack(wo, axis=-1))
         self._targets = np.cbrt(f_r * (damped(wi, wo, smooth=True) / self.scale)[:, None])
-        weight = _weight(*self._places, wi, wo)
+        weight = _weight(x, y, z, wi, wo)
         self._weights = weight / weight.mean()
 
     def _lattice(self, nodes: int) -> NodeLattice:
@@ -219,13 +216,9 @@ class Fitter:
 
     def _solved(self, lattice: NodeLattice) -> Problem:
         """Solves the least-squares problem of a lattice at the random directions, by conjugate gradients."""
-        corners = lattice.corners(*self._places, lattice.buffers())
-        nodes, weights = (np.stack([corner[k] for corner in corners], axis=-1) for k in (0, 1))
-        count = len(nodes)
-        starts = np.arange(count + 1) * len(corners)
-        matrix = self._sparse.csr_matrix((weights.ravel(), nodes.ravel(), starts), shape=(count, lattice.size))
-        weighted = self._sparse.diags_array(self._weights) @ matrix
-        normal = (weighted.T @ matrix).tocsr()
+        equations = _core.NormalEquations.of(
+            *lattice.axes(), self._places, self._weights, self._targets, **lattice.folds
+        )
         sampled = np.concatenate(
             [
                 self._grid(
@@ -234,20 +227,11 @@ class Fitter:
                 for x, b in zip(lattice.theta_h, lattice.band, strict=True)
             ]
         )
-        diagonal = normal.diagonal()
-        ridge = RIDGE * float(np.median(diagonal[diagonal > 0]))
-        system = normal + self._sparse.diags_array(np.full(lattice.size, ridge))
-        right = weighted.T @ self._targets + ridge * sampled
-        scaled = self._sparse.diags_array(1 / system.diagonal())
-        columns: list[Array] = [
-            self._solvers.cg(system, right[:, c], x0=sampled[:, c], M=scaled, maxiter=MOST_ITERATIONS, rtol=TOLERANCE)[
-                0
-            ]
-            for c in range(3)
-        ]
-        best = np.stack(columns, axis=-1)
-        error = float((((matrix @ best - self._targets) ** 2) * self._weights[:, None]).sum())
-        return Problem(lattice, system.tocsr(), np.ascontiguousarray(right), best, error)
+        diagonal = equations.diagonal()
+        held = equations.held(sampled, RIDGE * float(np.median(diagonal[diagonal > 0])))
+        best = held.solved(sampled, TOLERANCE, MOST_ITERATIONS)
+        error = float((best * (equations.product(best) - 2 * equations.right)).sum()) + equations.squares
+        return Problem(lattice, held, best, error)
 
 
 def line_errors(y: Array, weight: Array, axis: int, random: np.random.Generator) -> Array:
@@ -262,23 +246,7 @@ def line_errors(y: Array, weight: Array, axis: int, random: np.random.Generator)
     lines = np.flatnonzero(weight.sum(axis=0) > 0)
     chosen = random.permutation(lines)[:LINES]
     y, weight = y[:, chosen], weight[:, chosen]
-    x = np.arange(n, dtype=np.float64)
-    # Cumulative sums of w xᵐ, w y xᵐ and w y²: the sum over any stretch of places is a difference of two of them.
-    w = [_before(weight * x[:, None] ** m) for m in (0, 1, 2)]
-    s = [_before(weight[..., None] * y * x[:, None, None] ** m) for m in (0, 1)]
-    q = _before((weight[..., None] * y**2).sum(axis=-1))
-    errors = np.full((n, n), np.inf)
-    for i in range(n - 1):
-        j: NDArray[np.intp] = np.arange(i + 1, n)
-        length = (j - i)[:, None].astype(np.float64)
-        w0, w1, w2 = (part[j] - part[i + 1] for part in w)
-        w1, w2 = (w1 - i * w0) / length, (w2 - 2 * i * w1 + i * i * w0) / length**2
-        s0, s1 = (part[j] - part[i + 1] for part in s)
-        s1 = (s1 - i * s0) / length[..., None]
-        dots = ((s0 - s1) * y[i] + s1 * y[j]).sum(axis=-1)
-        squares = (w0 - 2 * w1 + w2) * (y[i] ** 2).sum(axis=-1) + w2 * (y[j] ** 2).sum(axis=-1)
-        squares += 2 * (w1 - w2) * (y[i] * y[j]).sum(axis=-1)
-        errors[i, i + 1 :] = np.maximum(q[j] - q[i + 1] - 2 * dots + squares, 0.0).sum(axis=1)
+    errors = _core.line_errors(n, np.ascontiguousarray(y).reshape(-1, 3), np.ascontiguousarray(weight).reshape(-1))
     return errors * (len(lines) / max(1, len(chosen)))
 
 
@@ -301,11 +269,6 @@ def best_nodes(errors: Array, most: int) -> Choices:
                 path.append(int(step[path[-1]]))
             found[count] = path[::-1], float(best[-1])
     return found
-
-
-def _before(terms: Array) -> Array:
-    """Cumulative sums along the first axis: at k, of the terms before k."""
-    return np.concatenate([np.zeros((1, *terms.shape[1:])), np.cumsum(terms, axis=0)])
 
 
 def _costs(choices: Choices) -> Array:

@@ -54,25 +54,24 @@ Start = Literal["som", "k-means"]
 class Problem:
     """The error of values z at a lattice's nodes, zᵀ H z − 2 bᵀ z + constant for each channel, and its minimum.
 
-    system: H, a sparse matrix in compressed rows (SciPy). right: b, (nodes, 3). best: the values z of least error,
-    (nodes, 3). error: the error of `best`, summed over the channels.
+    equations: H z = b. best: the values z of least error, (nodes, 3). error: the error of `best`, summed over the
+    channels.
     """
 
     lattice: NodeLattice
-    system: Any
-    right: Floats
+    equations: _core.NormalEquations
     best: Floats
     error: float
 
     def scaled(self, factors: Floats) -> Problem:
         """The problem whose values of least error are these times a factor for each node, (nodes)."""
         best = self.best * factors[:, None]
-        return replace(self, right=np.ascontiguousarray(self.system @ best), best=best)
+        return replace(self, equations=self.equations.with_right(self.equations.product(best)), best=best)
 
     def excess(self, values: Floats) -> float:
         """By how much the error of other values (nodes, 3) exceeds the least error."""
         away = values - self.best
-        return float((away * (self.system @ away)).sum())
+        return float((away * self.equations.product(away)).sum())
 
 
 @dataclass(frozen=True)
@@ -146,7 +145,7 @@ def _first(problem: Problem, gains: int, shapes: int, seed: int, start: Start) -
     least: Floats = np.abs(values).max(axis=1) / STEEPEST + DARKEST
     gain = np.where(np.abs(gain) < least, np.where(gain < 0, -least, least), gain)
     octaves, places = gain_codes(gain).astype(np.float64)[:, None], coordinates(values / gain[:, None])
-    weight = np.sqrt(problem.system.diagonal() * gain**2)
+    weight = np.sqrt(problem.equations.diagonal() * gain**2)
     train = _som if start == "som" else _k_means
     nodes = len(values)
     gain_nodes = train(_scaled(octaves), np.ones(nodes), min(gains, nodes // NODES_A_GAIN), seed)
@@ -172,8 +171,7 @@ def _som(x: Floats, weight: Floats, units: int, seed: int) -> NDArray[np.int64]:
     units = max(1, units)
     random = np.random.PCG64(seed)
     count = max(len(x), PRESENTATIONS * units)
-    triples = np.zeros((len(x), 3), np.float32)
-    triples[:, : x.shape[1]] = x
+    triples = _triples(x)
     # The learner treats all presentations alike, so nodes of more weight are presented more often.
     places = (np.sort(random.random_raw(count)) >> 11) * 2.0**-53
     drawn = np.searchsorted(np.cumsum(weight) / weight.sum(), places, side="right").clip(0, len(x) - 1)
@@ -201,54 +199,49 @@ def _k_means(x: Floats, weight: Floats, units: int, seed: int) -> NDArray[np.int
     return _nearest(centres, x).astype(np.int64)
 
 
-def _nearest(x: NDArray[Any], lut: NDArray[Any]) -> NDArray[np.intp]:
-    """For each row of x, the number of the nearest row of `lut`."""
-    tree = optional("scipy.spatial", "SciPy", "nearest entries", "formats").KDTree(lut)
-    found: NDArray[np.intp] = tree.query(x)[1]
-    return found
+def _nearest(x: NDArray[Any], lut: NDArray[Any]) -> NDArray[np.uint32]:
+    """For each row of x (n, 1 or 2), the number of the nearest row of `lut`."""
+    return _core.Quantiser(_triples(lut)).query(_triples(x))
+
+
+def _triples(x: NDArray[Any]) -> NDArray[np.float32]:
+    """Rows of one or two numbers as rows of three, the others 0."""
+    triples = np.zeros((len(x), 3), np.float32)
+    triples[:, : x.shape[1]] = x
+    return triples
 
 
 def _swept(problem: Problem, quantised: Quantised, price: float) -> Quantised:
     """One pass over all nodes, each of which takes the entries with the least error plus price · bits."""
     gain_index, shape_index = quantised.gain_index.copy(), quantised.shape_index.copy()
-    system = problem.system
-    quantised.palette(problem.lattice).sweep(
-        gain_index,
-        shape_index,
-        gain_values(quantised.gains),
-        shape_values(quantised.shapes),
-        system.indptr.astype(np.int32),
-        system.indices.astype(np.int32),
-        system.data,
-        problem.right,
-        price,
-    )
+    values = gain_values(quantised.gains), shape_values(quantised.shapes)
+    quantised.palette(problem.lattice).sweep(gain_index, shape_index, *values, problem.equations, price)
     return Quantised(quantised.gains, quantised.shapes, gain_index, shape_index)
 
 
 def _refined(problem: Problem, quantised: Quantised) -> Quantised:
     """The least-squares values of all gains with the shapes fixed, and then of all shapes with the gains fixed."""
-    q = quantised.ordered()
-    system, right = problem.system, problem.right
+    q, equations = quantised.ordered(), problem.equations
+    right = equations.right
     shapes = shape_values(q.shapes)[q.shape_index]
-    normal, wanted = np.zeros((len(q.gains), len(q.gains))), np.zeros(len(q.gains))
-    for c in range(3):
-        used = _incidence(q.gain_index, shapes[:, c], len(q.gains), system)
-        normal = normal + (used.T @ system @ used).toarray()
-        wanted = wanted + used.T @ right[:, c]
-    gains = gain_codes(_solved(normal, wanted[:, None], gain_values(q.gains)[:, None])[:, 0])
-    used = _incidence(q.shape_index, gain_values(gains)[q.gain_index], len(q.shapes), system)
+    normal = equations.between_entries(q.gain_index, shapes, len(q.gains))
+    wanted = _summed(q.gain_index, (shapes * right).sum(axis=1)[:, None], len(q.gains))
+    gains = gain_codes(_solved(normal, wanted, gain_values(q.gains)[:, None])[:, 0])
+    factors = gain_values(gains)[q.gain_index][:, None]
     # The three channels have the same matrix, and a shape's two coordinates and its mean are orthogonal combinations of
     # the channels. So the equations of a coordinate are the same combination of the channels' equations.
-    places = _solved(
-        (used.T @ system @ used).toarray(), coordinates(used.T @ right), coordinates(shape_values(q.shapes))
+    normal = equations.between_entries(q.shape_index, factors, len(q.shapes))
+    wanted = coordinates(_summed(q.shape_index, factors * right, len(q.shapes)))
+    return Quantised(
+        gains, shape_codes(_solved(normal, wanted, coordinates(shape_values(q.shapes)))), q.gain_index, q.shape_index
     )
-    return Quantised(gains, shape_codes(places), q.gain_index, q.shape_index)
 
 
-def _incidence(index: NDArray[Any], values: Floats, entries: int, like: Any) -> Any:
-    """A sparse matrix (nodes, entries) of the type of `like`: each node's value in the column of its entry."""
-    return type(like)((values, index.astype(np.int32), np.arange(len(index) + 1)), shape=(len(index), entries))
+def _summed(index: NDArray[Any], values: Floats, entries: int) -> Floats:
+    """The sums of values (nodes, k) over the nodes of each entry, (entries, k)."""
+    sums: Floats = np.zeros((entries, values.shape[1]))
+    np.add.at(sums, index, values)
+    return sums
 
 
 def _solved(normal: Floats, wanted: Floats, before: Floats) -> Floats:
