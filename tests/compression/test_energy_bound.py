@@ -6,7 +6,7 @@ from helpers import must_fail
 from kinds import KINDS
 from rgl_files import content
 
-from sommerl.compression.compact import lattice_fit, search
+from sommerl.compression.compact import search
 from sommerl.compression.compact.search import CompactOptions, compress
 from sommerl.formats.rgl import parse as parse_rgl
 from sommerl.reflectance.brdf import Brdf
@@ -27,29 +27,22 @@ def check_bounded(material, source):
     assert (material.albedo(ANGLES) <= np.maximum(1.0, 1.02 * source.albedo(ANGLES))).all()
 
 
-@pytest.fixture(autouse=True)
-def one_candidate_of_a_coarse_fit(monkeypatch):
-    monkeypatch.setattr(search, "SPREAD", (1.0,))
-    monkeypatch.setattr(lattice_fit, "DIRECTIONS", 50_000)
-    monkeypatch.setattr(lattice_fit, "LINES", 40)
-
-
 @pytest.mark.parametrize("size", [500, 1500])
 def test_a_white_material(monkeypatch, size):
-    check_bounded(compress(White(), CompactOptions(target_size=size))[0], White())
+    check_bounded(compress(White(), CompactOptions(target_size=size, effort=1))[0], White())
     monkeypatch.setattr(search.EnergyBound, "factors", lambda *_: np.ones(1))
-    must_fail(check_bounded, compress(White(), CompactOptions(target_size=size))[0], White())
+    must_fail(check_bounded, compress(White(), CompactOptions(target_size=size, effort=1))[0], White())
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "fitted"])
 def test_every_kind_of_material(kind):
     source = KINDS[kind]
-    check_bounded(compress(source, CompactOptions(target_size=1000))[0], source)
+    check_bounded(compress(source, CompactOptions(target_size=1000, effort=1))[0], source)
 
 
 def test_a_measurement_keeps_its_sides_and_signs(tmp_path):
     rgb = np.random.default_rng(3).normal(0.2, 0.2, (1, 4, 3, 5, 5)).astype(np.float32)
     source = parse_rgl(tmp_path / "x.bsdf", content(rgb=rgb))
-    material, _ = compress(source, CompactOptions(target_size=4000))
+    material, _ = compress(source, CompactOptions(target_size=4000, effort=1))
     assert (material.reciprocal, material.signed) == (False, True)
     check_bounded(material, source)

@@ -1,12 +1,15 @@
 """The compact preset: palettes, indices, and the choice of a size or a quality."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers import compact_material, complaint, lambertian_table, must_fail, random_directions
 
 from sommerl import BrdfTable, Lattice, builtin, load, save
 from sommerl.commands.cli import main
-from sommerl.compression.compact import lattice_fit, search
+from sommerl.compression.compact import effort as efforts
+from sommerl.compression.compact import search
 from sommerl.compression.compact.lattice_fit import Fitter
 from sommerl.compression.compact.quantise import Quantised, quantise
 from sommerl.compression.compact.search import CompactOptions, compress
@@ -21,16 +24,9 @@ A, B = (w[w[:, 2] > 0.1] for w in (random_directions(20_000, s) for s in (1, 2))
 A, B = A[:15_000], B[:15_000]
 
 
-@pytest.fixture(autouse=True)
-def coarse(monkeypatch):
-    """What tests fit themselves is fitted with fewer directions and lines than usual."""
-    monkeypatch.setattr(lattice_fit, "DIRECTIONS", 100_000)
-    monkeypatch.setattr(lattice_fit, "LINES", 100)
-
-
 @pytest.fixture(scope="module")
 def fitter():
-    return Fitter(builtin("blue-metallic-paint"))
+    return Fitter(builtin("blue-metallic-paint"), effort=efforts.of(1))
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +57,7 @@ def test_a_stream_of_at_most_a_size(problem):
     found, stream = quantise(problem, 80, 50, 800)
     check_fits(problem, found, stream, 800)
     must_fail(check_fits, problem, found, stream, len(stream) - 1)
-    worse = Quantised(found.gains, found.shapes, np.roll(found.gain_index, 1), found.shape_index)
+    worse = Quantised(found.gains, np.roll(found.gain_index, 1), found.shapes, found.shape_index)
     must_fail(
         check_fits, problem, worse, worse.palette(problem.lattice).encode(worse.gain_index, worse.shape_index), 800
     )
@@ -107,7 +103,7 @@ def test_excess_is_the_difference_of_errors(problem):
 
 @pytest.fixture(scope="module")
 def compact():
-    return compress(builtin("red-fabric"), CompactOptions(target_size=900))
+    return compress(builtin("red-fabric"), CompactOptions(target_size=900, effort=1))
 
 
 def check_close(brdf, source, worst):
@@ -124,7 +120,7 @@ def test_a_size(tmp_path, compact):
     check_close(again, builtin("red-fabric"), 0.02)
     must_fail(check_close, again, builtin("beige-fabric"), 0.02)
     assert report.quality is None
-    assert len(report.tried) == 3
+    assert len(report.tried) == 1
 
 
 def check_albedo(brdf, albedo):
@@ -136,7 +132,7 @@ def check_albedo(brdf, albedo):
 
 
 def test_a_lambertian_comes_back():
-    material, _ = compress(lambertian_table(0.5), CompactOptions(target_size=900))
+    material, _ = compress(lambertian_table(0.5), CompactOptions(target_size=900, effort=1))
     check_close(material, lambertian_table(0.5), 0.01)
     check_albedo(material, 0.5)
     must_fail(check_albedo, material, 0.505)
@@ -148,11 +144,11 @@ def test_what_is_not_reciprocal_stays_so_or_is_averaged():
     values = np.full((*lattice.shape, 3), 0.1)
     values[:, :, 20:] = 0.3
     source = BrdfTable(values, lattice)
-    material, _ = compress(source, CompactOptions(target_size=600))
+    material, _ = compress(source, CompactOptions(target_size=600, effort=1))
     assert [material.reciprocal, material.mirrored] == [False, False]
     check_close(material, source, 0.02)
     must_fail(check_close, reciprocal(source), source, 0.02)
-    material, _ = compress(reciprocal(source), CompactOptions(target_size=600))
+    material, _ = compress(reciprocal(source), CompactOptions(target_size=600, effort=1))
     assert material.reciprocal
     check_close(material, reciprocal(source), 0.02)
     assert np.median(material.eval(A, B)) == pytest.approx(0.2, rel=0.02)
@@ -161,20 +157,21 @@ def test_what_is_not_reciprocal_stays_so_or_is_averaged():
 def test_one_pure_colour():
     source = lambertian_table(0.5)
     source.values[..., 1:] = 0
-    material, _ = compress(source, CompactOptions(target_size=600))
+    material, _ = compress(source, CompactOptions(target_size=600, effort=1))
     found = material.eval(A, B)
     assert np.median(found[:, 0]) == pytest.approx(0.5 / np.pi, rel=0.02)
     assert found[:, 1:].max() < 1e-3 * 0.5 / np.pi
 
 
-def test_what_decides_is_handed_in():
+def test_what_decides_is_handed_in(monkeypatch):
+    monkeypatch.setattr(efforts, "EFFORTS", (replace(efforts.of(1), spread=(1.0, 0.8, 1.2)),))
     seen = []
 
     def quality(material):
         seen.append(material.lattice.size)
         return 40.0 + len(seen)
 
-    material, report = compress(builtin("red-fabric"), CompactOptions(target_size=700), quality=quality)
+    material, report = compress(builtin("red-fabric"), CompactOptions(target_size=700, effort=1), quality=quality)
     assert report.quality == 43.0
     assert material.lattice.size == seen[-1] == report.tried[-1][1]
 
@@ -185,7 +182,7 @@ def test_a_quality():
     def quality(material):
         return 30 + 3 * np.log2(len(file.encode(material)) / 400)
 
-    material, report = compress(builtin("red-fabric"), CompactOptions(target_psnr=33), quality=quality)
+    material, report = compress(builtin("red-fabric"), CompactOptions(target_psnr=33, effort=1), quality=quality)
     assert report.quality >= 33
     assert len(file.encode(material)) < 900
     assert report.quality == pytest.approx(quality(material), abs=1e-3)
@@ -221,18 +218,21 @@ def test_a_quality_out_of_reach(monkeypatch):
     with pytest.raises(
         MaterialError, match=r"it cannot be compressed with 70 dB; the best file found has 12.0 dB with 600 bytes"
     ):
-        compress(builtin("red-fabric"), CompactOptions(target_psnr=70), quality=lambda material: 12.0)
+        compress(builtin("red-fabric"), CompactOptions(target_psnr=70, effort=1), quality=lambda material: 12.0)
 
 
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
         ({"target_size": 299}, "target_size: expected 300 to 64000, found 299"),
-        ({"target_size": 1e6}, "target_size, seed: they have to be whole numbers"),
+        ({"target_size": 1e6}, "target_size, effort, seed: they have to be whole numbers"),
         ({"target_psnr": float("nan")}, "target_psnr: expected 20 to 80, found nan"),
         ({"target_psnr": 99.0}, "target_psnr: expected 20 to 80, found 99"),
         ({"target_psnr": 40.0, "target_size": 1000}, "a size and a PSNR cannot both be asked for"),
         ({"seed": -1}, "seed: expected 0 to"),
+        ({"effort": 0}, "effort: expected 1 to 9, found 0"),
+        ({"effort": 10}, "effort: expected 1 to 9, found 10"),
+        ({"effort": 1.5}, "target_size, effort, seed: they have to be whole numbers"),
     ],
 )
 def test_bad_options(options, sentence):
@@ -282,6 +282,8 @@ def test_one_that_fails_does_not_hold_up_the_others(capsys, tmp_path, monkeypatc
     [
         (["--preset", "paper", "--target-size", "800"], "--target-size: expected --preset compact, found paper"),
         (["--target-size", "800", "--clusters", "9"], "--clusters: expected --preset paper, found compact"),
+        (["--effort", "2"], "--effort: expected --preset compact, found paper"),
+        (["--target-size", "800", "--effort", "10"], "--effort: expected 1 to 9, found 10"),
         (["--target-size", "8"], "--target-size: expected 300 to 64000, found 8"),
     ],
 )

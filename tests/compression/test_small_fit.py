@@ -1,11 +1,13 @@
 """The compact preset from source to file, with fewer directions and lines than usual: every step, in some seconds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers import must_fail, random_directions
 
 from sommerl import builtin
-from sommerl.compression.compact import lattice_fit, search
+from sommerl.compression.compact import effort as efforts
 from sommerl.compression.compact.lattice_fit import Fitter
 from sommerl.compression.compact.quantise import quantise
 from sommerl.compression.compact.search import CompactOptions, compress
@@ -15,17 +17,9 @@ A, B = (w[w[:, 2] > 0.2][:3000] for w in (random_directions(5000, s) for s in (1
 PAINT = builtin("blue-metallic-paint")
 
 
-@pytest.fixture(scope="module", autouse=True)
-def coarse():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(lattice_fit, "DIRECTIONS", 20_000)
-        patch.setattr(lattice_fit, "LINES", 40)
-        yield
-
-
 @pytest.fixture(scope="module")
 def fitter():
-    return Fitter(PAINT, seed=1)
+    return Fitter(PAINT, seed=1, effort=replace(efforts.of(1), directions=20_000, lines=150))
 
 
 @pytest.fixture(scope="module")
@@ -73,13 +67,12 @@ def test_palettes_within_a_size(problem):
     found, stream = quantise(problem, 60, 40, 450)
     check_palette(problem, found, stream, 450, 6e-5)
     must_fail(check_palette, problem, found, stream, len(stream) - 1, 6e-5)
-    rolled = type(found)(found.gains, found.shapes, np.roll(found.gain_index, 1), found.shape_index)
+    rolled = replace(found, gain_index=np.roll(found.gain_index, 1))
     must_fail(check_palette, problem, rolled, stream, 450, 6e-5)
 
 
-def test_a_file_of_a_size(monkeypatch):
-    monkeypatch.setattr(search, "SPREAD", (1.0,))
-    material, report = compress(PAINT, CompactOptions(target_size=600))
+def test_a_file_of_a_size():
+    material, report = compress(PAINT, CompactOptions(target_size=600, effort=1))
     assert len(encode(material)) <= 600
     assert report.tried[0][0] == len(encode(material))
     check_near(material, 0.023)

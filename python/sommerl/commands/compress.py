@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, Literal
 
+from ..compression.compact.effort import DEFAULT as EFFORT
 from ..compression.compact.search import DEFAULT_PSNR, LARGEST_SIZE, SMALLEST_SIZE, CompactOptions, CompactReport
 from ..compression.material import SomManBrdf
 from ..compression.paper.options import Order, Rule, Topology, TrainOptions
@@ -63,6 +64,11 @@ class CompressArguments(WritingArguments):
         metavar="DB",
         instead_of="target",
         help=f"compact: the smallest file of at least that PSNR on a sphere in soft light ({DEFAULT_PSNR:g})",
+    )
+    effort: int = option(
+        default=EFFORT,
+        metavar="N",
+        help="compact: how much work goes into a file, from 1 (quick) to 9 (thorough) (%(default)s)",
     )
     reciprocal: bool = option(
         default=False, help="compact: the mean of both orders of the directions, which a file holds with fewer nodes"
@@ -148,8 +154,8 @@ def _method(options: CompressArguments) -> CompactOptions | TrainOptions:
             if each.name != "seed" and getattr(options, each.name) != getattr(DEFAULTS, each.name):
                 raise OptionError(f"{flag(each.name)}: expected --preset paper, found compact")
         return library_options(CompactOptions, options)
-    for name in ("target_size", "target_psnr", "reciprocal"):
-        if getattr(options, name):
+    for name in ("target_size", "target_psnr", "effort", "reciprocal"):
+        if getattr(options, name) not in (None, False, EFFORT):
             raise OptionError(f"{flag(name)}: expected --preset compact, found paper")
     return library_options(TrainOptions, options)
 

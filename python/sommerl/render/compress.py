@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ..compression.compact import effort as efforts
 from ..compression.compact import search
 from ..compression.compact.search import CompactOptions, CompactReport, Progress
 from ..compression.material import SomManBrdf
@@ -17,6 +18,7 @@ def compress(
     *,
     target_size: int | None = None,
     target_psnr: float | None = None,
+    effort: int = efforts.DEFAULT,
     reciprocal: bool = False,
     seed: int = 0,
     progress: Progress | None = None,
@@ -25,24 +27,26 @@ def compress(
 
     target_size: the most bytes that its file may take; the material of that size with the best `judge.score` is
     returned. target_psnr: the least PSNR [dB] of a sphere in soft light (`judge`); the smallest material that reaches
-    it is returned. `search.DEFAULT_PSNR` if neither is given. reciprocal: compress the mean of both orders of the
-    directions (`reflectance.reciprocal`), which the targets then refer to. seed: of directions, first weights and
-    order; the same input, options and seed give the same bytes. progress: called with steps done and steps in all.
+    it is returned. `search.DEFAULT_PSNR` if neither is given. effort: how much work goes into it, from 1 to 9
+    (`compact.effort`). reciprocal: compress the mean of both orders of the directions (`reflectance.reciprocal`), which
+    the targets then refer to. seed: of directions, first weights and order; the same input, options and seed give the
+    same bytes. progress: called with steps done and steps in all.
 
-    The report's metrics say how far the material is from `brdf`, as it is given. It takes half a minute to a minute.
-    Nothing is rendered.
+    The report's metrics say how far the material is from `brdf`, as it is given. Nothing is rendered.
 
-    Raises OptionError for a size or a PSNR out of range, or both; MaterialError if the target cannot be met; and
-    MissingDependencyError without SciPy.
+    Raises OptionError for a size, a PSNR or an effort out of range, or if both targets are given; and MaterialError if
+    the target cannot be met.
     """
-    options = CompactOptions(target_size, target_psnr, seed)
+    options = CompactOptions(target_size, target_psnr, effort, seed)
     fitted = averaged(brdf) if reciprocal else brdf
     judge = Judge(fitted)
+    judged: list[tuple[SomManBrdf, dict[str, float]]] = []
 
     def quality(material: SomManBrdf) -> float:
         metrics = judge.metrics(material)
+        judged.append((material, metrics))
         return score(metrics) if options.target_size is not None else metrics["psnr_soft_db"]
 
     material, report = search.compress(fitted, options, quality=quality, progress=progress)
-    against = judge if fitted is brdf else Judge(brdf)
-    return material, replace(report, metrics=against.metrics(material))
+    known = [metrics for candidate, metrics in judged if candidate is material and fitted is brdf]
+    return material, replace(report, metrics=known[0] if known else Judge(brdf).metrics(material))

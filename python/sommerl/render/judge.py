@@ -102,7 +102,7 @@ def _lit(brdf: Brdf, normals: Vectors, lamps: Vectors, power: Values) -> Values:
     total = np.zeros((len(viewer), 3))
     for start in range(0, len(lamps), AT_ONCE):
         part = slice(start, start + AT_ONCE)
-        light = np.einsum("nij,kj->nki", frame, lamps[part])
+        light = np.ascontiguousarray((frame.reshape(-1, 3) @ lamps[part].T).reshape(len(frame), 3, -1).swapaxes(1, 2))
         f_r = brdf.eval(light, viewer[:, None])
         total += np.einsum("nkc,nk,kc->nc", f_r, np.maximum(light[..., 2], 0.0), power[part])
     return total

@@ -118,8 +118,9 @@ class HalfVectorSampler(Sampler):
         found = np.full((angles.size, 3), np.nan)
         for number in np.flatnonzero(known):
             cos_o = np.cos(angles.reshape(-1)[number : number + 1])
-            sides = [_light(self.brdf, cos_o, points, side)[0].mean(axis=(0, 1, 2, 3)) for side in (1.0, -1.0)]
-            found[number] = (sides[0] + sides[1]) / 2
+            sides = (1.0,) if self.brdf.mirrored else (1.0, -1.0)
+            light = [_light(self.brdf, cos_o, points, side)[0].mean(axis=(0, 1, 2, 3)) for side in sides]
+            found[number] = np.mean(light, axis=0)
         return found.reshape(*angles.shape, 3)
 
 

@@ -16,24 +16,32 @@ from ...reflectance.nodes import NodeLattice, angles_at
 
 # Of viewers, closer together where albedos change fastest
 ANGLES = np.radians((0, 10, 20, 30, 40, 50, 60, 68, 74, 78, 81, 84, 86, 87, 88, 88.5, 89, 89.3, 89.5))
-POINTS = 16  # along each side of a sampler's cell, of the albedos' quadrature
 ALLOWED = 1.02  # times the source's albedo, or 1 if that is more
 AIM = 0.985  # of what is allowed, since quadrature and interpolation between ANGLES are not exact
+DARK = 1e-9  # an albedo below counts as that much
 
 Floats = NDArray[np.float64]
 
 
 class EnergyBound:
-    """What a material made from a source may reflect to viewers at ANGLES."""
+    """What a material made from a source may reflect to viewers at ANGLES.
 
-    def __init__(self, source: Brdf) -> None:
-        self._most = np.maximum(1.0, ALLOWED * source.sampler.albedo(ANGLES, points=POINTS))
+    points: along each side of a sampler's cell, of the albedos' quadrature.
+    """
+
+    def __init__(self, source: Brdf, points: int) -> None:
+        self._points = points
+        self._most = np.maximum(1.0, ALLOWED * source.sampler.albedo(ANGLES, points=points))
 
     def factors(self, brdf: Brdf) -> Floats:
         """By what f_r would have to be multiplied at each of ANGLES, at most 1."""
-        found = brdf.sampler.albedo(ANGLES, points=POINTS)
+        found = brdf.sampler.albedo(ANGLES, points=self._points)
         within = (found <= self._most).all()
-        return np.ones(len(ANGLES)) if within else np.minimum(1.0, AIM * (self._most / found).min(axis=-1))
+        return (
+            np.ones(len(ANGLES))
+            if within
+            else np.minimum(1.0, AIM * (self._most / np.maximum(found, DARK)).min(axis=-1))
+        )
 
 
 def at_nodes(factors: Floats, lattice: NodeLattice) -> Floats:

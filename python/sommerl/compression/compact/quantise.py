@@ -21,6 +21,10 @@ from ...system.errors import MaterialError
 from ...system.optional import optional
 from ..paper.reference import EMPTY
 from ..smrl.codes import Codes, Floats, coordinates, gain_codes, gain_values, shape_codes, shape_values
+from . import effort as efforts
+from .effort import Effort
+
+DEFAULT_EFFORT = efforts.of(efforts.DEFAULT)
 
 # The measurements below are changes of the final error of nickel (SGD) and irid_flake_paint1 (RGL) in 2,700 bytes.
 
@@ -39,7 +43,6 @@ STEEPEST = 8.0
 TINY = 1e-9  # added to a divisor that is 0 if all nodes have the same shape
 
 # The alternation
-TURNS, LAST_TURNS = 10, 8  # with sizes estimated, and with real streams; half or twice as many: 0.02 dB
 FIRST_PRICE = 0.3  # of a bit, in units of the mean error of a node; 0.1 and 1: 0.2 dB
 AIM = 0.997  # of the target size, since sizes vary a little from turn to turn; 0.99 and 1: 0.01 dB
 STEER = 2.5  # the price is multiplied by (size / aim) to this power; 1.5 and 4: 0.02 dB
@@ -79,8 +82,8 @@ class Quantised:
     """Palettes as codes: gains (G,), increasing, and shapes (S, 2); and the numbers of each node's two entries."""
 
     gains: Codes
-    shapes: Codes
     gain_index: NDArray[np.uint16]
+    shapes: Codes
     shape_index: NDArray[np.uint16]
 
     def values(self) -> Floats:
@@ -103,29 +106,45 @@ class Quantised:
 
     def ordered(self) -> Quantised:
         """The same, without unused and repeated entries, and sorted in the order in which a file stores them."""
-        gains, gain_index = np.unique(self.gains[self.gain_index], return_inverse=True)
-        shapes, shape_index = np.unique(self.shapes[self.shape_index], axis=0, return_inverse=True)
-        return Quantised(gains, shapes, gain_index.astype(np.uint16), shape_index.reshape(-1).astype(np.uint16))
+        return Quantised(*_ordered(self.gains, self.gain_index), *_ordered(self.shapes, self.shape_index))
+
+
+def _ordered(codes: Codes, index: NDArray[np.uint16]) -> tuple[Codes, NDArray[np.uint16]]:
+    """Codes without unused and repeated ones, sorted, and the index that belongs to them."""
+    distinct, number = np.unique(codes, axis=0, return_inverse=True)
+    found = number.reshape(-1)[index]
+    used = np.zeros(len(distinct), bool)
+    used[found] = True
+    return distinct[used], (np.cumsum(used) - 1)[found].astype(np.uint16)
 
 
 def quantise(
-    problem: Problem, gains: int, shapes: int, target: int, *, seed: int = 0, start: Start = "som", refine: bool = True
+    problem: Problem,
+    gains: int,
+    shapes: int,
+    target: int,
+    *,
+    seed: int = 0,
+    effort: Effort = DEFAULT_EFFORT,
+    start: Start = "som",
+    refine: bool = True,
 ) -> tuple[Quantised, bytes]:
     """The quantised values of least error whose stream has at most `target` bytes, and the stream.
 
     If all streams that were tried are longer, returns the shortest. gains, shapes: the largest numbers of entries.
-    start: what the first palettes are learnt by. refine: False keeps the original values that the MAN chose.
+    effort: how many turns there are. start: what the first palettes are learnt by. refine: False keeps the original
+    values that the MAN chose.
     Raises MaterialError if a stream would take readers too long (docs/format.md, *A reader's work*).
     """
     quantised = _first(problem, gains, shapes, seed, start)
     price = FIRST_PRICE * problem.error / len(problem.best)
     found: list[tuple[float, Quantised, bytes]] = []
-    for turn in range(TURNS + LAST_TURNS):
+    for turn in range(effort.turns + effort.last_turns):
         if refine and turn:
             quantised = _refined(problem, quantised)
         quantised = _swept(problem, quantised.ordered(), price)
         ordered = quantised.ordered()
-        if turn < TURNS:
+        if turn < effort.turns:
             size = sum(ordered.palette(problem.lattice).measure(ordered.gain_index, ordered.shape_index)) / 8
         else:
             stream = ordered.stream(problem.lattice)
@@ -154,7 +173,7 @@ def _first(problem: Problem, gains: int, shapes: int, seed: int, start: Start) -
     gain_lut, shape_lut = gain_codes(gain[gain_nodes]), shape_codes(places[shape_nodes])
     gain_index = _nearest(octaves, gain_lut[:, None])
     shape_index = _nearest(shape_codes(places), shape_lut)
-    return Quantised(gain_lut, shape_lut, gain_index.astype(np.uint16), shape_index.astype(np.uint16))
+    return Quantised(gain_lut, gain_index.astype(np.uint16), shape_lut, shape_index.astype(np.uint16))
 
 
 def _scaled(places: Floats) -> Floats:
@@ -216,25 +235,23 @@ def _swept(problem: Problem, quantised: Quantised, price: float) -> Quantised:
     gain_index, shape_index = quantised.gain_index.copy(), quantised.shape_index.copy()
     values = gain_values(quantised.gains), shape_values(quantised.shapes)
     quantised.palette(problem.lattice).sweep(gain_index, shape_index, *values, problem.equations, price)
-    return Quantised(quantised.gains, quantised.shapes, gain_index, shape_index)
+    return Quantised(quantised.gains, gain_index, quantised.shapes, shape_index)
 
 
 def _refined(problem: Problem, quantised: Quantised) -> Quantised:
     """The least-squares values of all gains with the shapes fixed, and then of all shapes with the gains fixed."""
     q, equations = quantised.ordered(), problem.equations
-    right = equations.right
-    shapes = shape_values(q.shapes)[q.shape_index]
-    normal = equations.between_entries(q.gain_index, shapes, len(q.gains))
-    wanted = _summed(q.gain_index, (shapes * right).sum(axis=1)[:, None], len(q.gains))
+    right, factors = equations.right, shape_values(q.shapes)[q.shape_index]
+    normal = equations.between_entries(q.gain_index, factors, len(q.gains))
+    wanted = _summed(q.gain_index, (factors * right).sum(axis=1)[:, None], len(q.gains))
     gains = gain_codes(_solved(normal, wanted, gain_values(q.gains)[:, None])[:, 0])
     factors = gain_values(gains)[q.gain_index][:, None]
     # The three channels have the same matrix, and a shape's two coordinates and its mean are orthogonal combinations of
     # the channels. So the equations of a coordinate are the same combination of the channels' equations.
     normal = equations.between_entries(q.shape_index, factors, len(q.shapes))
     wanted = coordinates(_summed(q.shape_index, factors * right, len(q.shapes)))
-    return Quantised(
-        gains, shape_codes(_solved(normal, wanted, coordinates(shape_values(q.shapes)))), q.gain_index, q.shape_index
-    )
+    shapes = shape_codes(_solved(normal, wanted, coordinates(shape_values(q.shapes))))
+    return Quantised(gains, q.gain_index, shapes, q.shape_index)
 
 
 def _summed(index: NDArray[Any], values: Floats, entries: int) -> Floats:
