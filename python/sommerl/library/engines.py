@@ -8,7 +8,7 @@ import os
 import signal
 import threading
 import warnings
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -20,6 +20,8 @@ from ..system.errors import OptionError
 from ..system.interrupt import hold_interrupts
 from ..system.optional import optional
 
+# Python has a process that clears up after others; it would complain of a build that was killed.
+QUIET = "ignore::UserWarning:multiprocessing.resource_tracker"
 CONNECTING = 10.0  # seconds in which a cluster has to answer
 
 
@@ -52,24 +54,32 @@ def _processes(count: int) -> Generator[Executor]:
     # Not by fork: a copy of this process would hold the library's lock after its death.
     context = multiprocessing.get_context("spawn")
     life, ours = context.Pipe(duplex=False)
-    before = os.environ.get(threads.VARIABLE)
-    threads.use(1)  # is inherited, and read when NumPy is loaded
-    pool = ProcessPoolExecutor(count, context, initializer=_begin, initargs=(life,))
+    quiet = ",".join(filter(None, (os.environ.get("PYTHONWARNINGS"), QUIET)))
+    with life, ours, _inherited({threads.VARIABLE: "1", "PYTHONWARNINGS": quiet}):
+        pool = ProcessPoolExecutor(count, context, initializer=_begin, initargs=(life,))
+        try:
+            yield pool
+            pool.shutdown()
+        except BaseException:
+            with hold_interrupts():
+                ours.close()  # ends them all, in the middle of their work
+                pool.shutdown(cancel_futures=True)
+            raise
+
+
+@contextmanager
+def _inherited(variables: Mapping[str, str]) -> Generator[None]:
+    """Within the block, new processes have these variables in their environment."""
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
     try:
-        yield pool
-        pool.shutdown()
-    except BaseException:
-        with hold_interrupts():
-            ours.close()  # ends them all, in the middle of their work
-            pool.shutdown(wait=False, cancel_futures=True)
-        raise
+        yield
     finally:
-        ours.close()
-        life.close()
-        if before is None:
-            os.environ.pop(threads.VARIABLE, None)
-        else:
-            os.environ[threads.VARIABLE] = before
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
 
 
 def _begin(life: Connection) -> None:
@@ -88,7 +98,8 @@ def _begin(life: Connection) -> None:
 @contextmanager
 def _cluster(address: str, warn: Callable[[str], None]) -> Generator[Executor]:
     distributed = optional("distributed", "Dask's distributed scheduler", "--cluster", "cluster")
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what fails is told in a sentence of ours
+    for handler in logging.getLogger("distributed").handlers:
+        handler.addFilter(lambda _: False)  # what fails is told in a sentence of ours
     try:
         with hold_interrupts(), warnings.catch_warnings():
             warnings.simplefilter("ignore", ResourceWarning)
