@@ -36,7 +36,10 @@ def test_the_clock_decides(capsys, monkeypatch):
     with console.progress("rendering") as advance:
         for done in range(1, 11):
             advance(done, 20)
-    assert capsys.readouterr().err.splitlines() == ["rendering: 20% after 12 s", "rendering: 40% after 24 s"]
+    assert capsys.readouterr().err.splitlines() == [
+        "rendering: 20% after 12 s, some 48 s left",
+        "rendering: 40% after 24 s, some 36 s left",
+    ]
 
 
 def test_a_full_standard_error_stops_no_work(monkeypatch):

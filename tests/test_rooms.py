@@ -11,7 +11,7 @@ import sommerl
 PACKAGE = Path(sommerl.__file__).parent
 ROOMS = (
     "system", "reflectance", "models", "factored", "sampling", "compression", "fitting", "formats", "render", "plots",
-    "viewer", "reproduction", "commands",
+    "library", "viewer", "reproduction", "commands",
 )  # fmt: skip
 
 

@@ -34,7 +34,7 @@ def completion(options: CompletionArguments) -> dict[str, Any]:
     from .cli import parser  # which has this module among its commands
 
     commands = parser()
-    for made in [commands, *commands.commands()]:
+    for made in [commands, *commands.leaves()]:
         for action in made.actions():
             if action.type in (Path, Material):
                 action.complete = shtab.FILE  # pyright: ignore[reportAttributeAccessIssue]

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from ..compression.compact.effort import DEFAULT as EFFORT
-from ..compression.compact.search import DEFAULT_PSNR, LARGEST_SIZE, SMALLEST_SIZE, CompactOptions, CompactReport
+from ..compression.compact.search import CompactOptions, CompactReport
 from ..compression.material import SomManBrdf
-from ..compression.paper.options import Order, Rule, Topology, TrainOptions
-from ..compression.paper.train import TrainReport, train
+from ..compression.paper import measured
+from ..compression.paper.options import TrainOptions
+from ..compression.paper.train import TrainReport
 from ..compression.smrl import file as smrl
 from ..formats.load import load
 from ..reflectance.brdf import Brdf
-from ..reflectance.distance import table_metrics
 from ..reflectance.info import Counts
 from ..reflectance.reciprocal import reciprocal as averaged
 from ..reflectance.table import BrdfTable
@@ -23,22 +22,18 @@ from ..render.compress import compress as compressed
 from ..render.judge import Judge
 from ..system.errors import OptionError, SommerlError
 from . import answers, console
-from .arguments import Material, WritingArguments, byte_count, flag, library_options, option, positional
+from .arguments import Material, option, positional
 from .checks import check_output
 from .folders import make_folder
 from .inputs import expanded, is_several, readable, stem
+from .method_arguments import MethodArguments, chosen_method
 from .outcome import PartlyDone
 from .parser import add_command
 from .rows import changed_rows, fact_rows, judged_rows, origin_rows, table_rows
 
-DEFAULTS = TrainOptions()
-METRICS_DIGITS = 6  # so that the file does not hold the last bits of a machine's sums
-
-Preset = Literal["paper", "compact"]
-
 
 @dataclass(frozen=True, kw_only=True)
-class CompressArguments(WritingArguments):
+class CompressArguments(MethodArguments):
     """What `compress` is asked for."""
 
     inputs: tuple[Material, ...] = positional(
@@ -46,58 +41,6 @@ class CompressArguments(WritingArguments):
     )
     output: Path = option(
         "-o", metavar="OUT", help="a .smrl file; or, for any number of inputs, a folder, which is made if there is none"
-    )
-    preset: Preset | None = option(
-        default=None,
-        help="paper: MERL's lattice, nearest lookup; compact: a lattice fitted to the material, interpolated, in a "
-        "file of some kilobytes (paper; compact if there is a target)",
-    )
-    target_size: int | None = option(
-        default=None,
-        metavar="BYTES",
-        read=byte_count,
-        instead_of="target",
-        help=f"compact: the best file of at most that size, {SMALLEST_SIZE} to {LARGEST_SIZE} bytes, also as 8kB",
-    )
-    target_psnr: float | None = option(
-        default=None,
-        metavar="DB",
-        instead_of="target",
-        help=f"compact: the smallest file of at least that PSNR on a sphere in soft light ({DEFAULT_PSNR:g})",
-    )
-    effort: int = option(
-        default=EFFORT,
-        metavar="N",
-        help="compact: how much work goes into a file, from 1 (quick) to 9 (thorough) (%(default)s)",
-    )
-    reciprocal: bool = option(
-        default=False, help="compact: the mean of both orders of the directions, which a file holds with fewer nodes"
-    )
-    clusters: int = option(
-        default=DEFAULTS.clusters, metavar="M", help="paper: the number of entries in the palette (%(default)s)"
-    )
-    epochs: int = option(
-        default=DEFAULTS.epochs, metavar="E", help="paper: how often the table is presented (%(default)s)"
-    )
-    seed: int = option(default=DEFAULTS.seed, metavar="S", help="of directions, first weights and order (%(default)s)")
-    rule: Rule = option(
-        default=DEFAULTS.rule,
-        help="paper: Eq. 2 as printed (paper), or without its factor x (kohonen) (%(default)s)",
-    )
-    alpha: float = option(
-        default=DEFAULTS.alpha, metavar="A", help="paper: first learning rate, above 0, at most 1 (%(default)s)"
-    )
-    order: Order = option(default=DEFAULTS.order, help="paper: of presentation (%(default)s)")
-    radius: float = option(
-        default=DEFAULTS.radius,
-        metavar="R",
-        help="paper: of the neighbourhood in the first epoch, in units; 0: the winner learns alone (%(default)s)",
-    )
-    topology: Topology = option(
-        default=DEFAULTS.topology, help="paper: how the units are arranged for that (%(default)s)"
-    )
-    distinct: bool = option(
-        default=DEFAULTS.distinct, help="paper: a unit stores a cell once at most, and not again in a later epoch"
     )
 
 
@@ -112,7 +55,7 @@ def arguments(add: Any) -> None:
 
 def compress(options: CompressArguments) -> dict[str, Any]:
     """Compresses each material. Raises PartlyDone if some of several fail."""
-    method = _method(options)
+    method = chosen_method(options)
     sources = expanded(options.inputs)
     several = len(sources) > 1 or any(is_several(source) for source in options.inputs)
     outputs = _outputs(sources, options.output, several=several)
@@ -143,21 +86,6 @@ def _compressed(
     if isinstance(method, CompactOptions):
         return compact_one(source, load(source), output, method, options.json, reciprocal=options.reciprocal)
     return compress_one(source, load(source), output, method, options.json)
-
-
-def _method(options: CompressArguments) -> CompactOptions | TrainOptions:
-    """The options of the preset that is asked for. Raises OptionError for those of the other one."""
-    targets = options.target_size, options.target_psnr
-    preset = options.preset or ("paper" if targets == (None, None) else "compact")
-    if preset == "compact":
-        for each in fields(TrainOptions):
-            if each.name != "seed" and getattr(options, each.name) != getattr(DEFAULTS, each.name):
-                raise OptionError(f"{flag(each.name)}: expected --preset paper, found compact")
-        return library_options(CompactOptions, options)
-    for name in ("target_size", "target_psnr", "effort", "reciprocal"):
-        if getattr(options, name) not in (None, False, EFFORT):
-            raise OptionError(f"{flag(name)}: expected --preset compact, found paper")
-    return library_options(TrainOptions, options)
 
 
 def _outputs(sources: Sequence[str], output: Path, *, several: bool) -> list[Path]:
@@ -219,18 +147,7 @@ def fitted(brdf: Brdf, options: CompactOptions, *, reciprocal: bool = False) -> 
 def trained(table: BrdfTable, options: TrainOptions) -> tuple[SomManBrdf, TrainReport]:
     """Trains under a progress bar, and measures the result."""
     with console.progress(f"training {table.name}") as advance:
-        material, report = train(table, options, progress=advance)
-    metrics = table_metrics(table.values, material.values, table.lattice)
-    measured = metrics | {"quantisation_error": report.quantisation_error[-1]}
-    material.metrics = {name: _rounded(value) for name, value in measured.items()}
-    facts = table.facts | {name: value for name, value in asdict(table.counts).items() if value}
-    if facts:
-        material.options["source_facts"] = {name: _rounded(value) for name, value in facts.items()}
-    return material, report
-
-
-def _rounded(value: Any) -> Any:
-    return float(f"{value:.{METRICS_DIGITS}g}") if isinstance(value, float) else value
+        return measured.train(table, options, progress=advance)
 
 
 def compression_rows(material: SomManBrdf, bytes_disk: int, report: TrainReport) -> dict[str, str]:

@@ -76,7 +76,9 @@ def _lines(what: str) -> Advance:
         now = time.monotonic()
         if done < total and now - last >= INTERVAL:
             last = now
-            tell(f"{what}: {done / total:.0%} after {now - started:.0f} s")
+            left = (now - started) * (total - done) / done if done else 0
+            more = f", some {left:.0f} s left" if done else ""
+            tell(f"{what}: {done / total:.0%} after {now - started:.0f} s{more}")
 
     return advance
 

@@ -14,12 +14,11 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, TextIO
 
-from ..system.errors import MaterialError, OptionError, SommerlError
+from ..system.errors import MaterialError, OptionError, SommerlError, unexpected
 from ..system.visible import visible
 from .console import tell, warn
 
 DEBUG = "SOMMERL_DEBUG"
-LONGEST = 300  # characters of what an error that nobody thought of says
 
 
 class PartlyDone(MaterialError):
@@ -123,10 +122,4 @@ def _unexpected(error: BaseException) -> str:
     if os.environ.get(DEBUG) == "1":
         for line in "".join(traceback.format_exception(error)).splitlines():
             tell(visible(line))
-    try:
-        text = " ".join(str(error).split())
-    except Exception:  # it may be anybody's
-        text = ""
-    text = visible(text if len(text) <= LONGEST else f"{text[:LONGEST]}…")
-    found = type(error).__name__ + (f" ({text})" if text else "")
-    return f"something went wrong that Sommerl did not expect: {found}; please report it, with what {DEBUG}=1 adds"
+    return f"{unexpected(error)}; please report it, with what {DEBUG}=1 adds"

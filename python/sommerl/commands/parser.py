@@ -44,9 +44,14 @@ class Parser(argparse.ArgumentParser):
         self.error(f"{word}: expected an option of {self.prog}, found none of that name{hint}")
 
     def commands(self) -> list[Parser]:
-        """The parsers of the commands, if this is the one of all."""
+        """The parsers of the commands, if this is the one of all, or of the sub-commands."""
         found = [action for action in self._actions if isinstance(action, argparse._SubParsersAction)]  # pyright: ignore
         return [command for action in found for command in action.choices.values()]  # pyright: ignore
+
+    def leaves(self) -> list[Parser]:
+        """The parsers of all commands and sub-commands that do something."""
+        below = self.commands()
+        return [leaf for each in below for leaf in each.leaves()] if below else [self]
 
     def actions(self) -> list[argparse.Action]:
         """All arguments that this one takes."""

@@ -44,6 +44,25 @@ def read(path: str | Path, member: str = "") -> MultiLobe:
 
 def parse(path: Path, data: bytes, member: str = "") -> MultiLobe:
     """As `read`, from the file's bytes; the path is for names and messages alone."""
+    top, fits, models = _models(path, data)
+    material = _name(path, "material", top.get("material"))
+    if member and member not in models:
+        raise FormatError(f"{path}: expected one of {', '.join(models[:20])}, found {member}")
+    at = models.index(member) if member else 0
+    try:
+        lobes = [_lobe(path, lobe) for lobe in _sequence(path, "parameters", fits[at].get("parameters"))]
+        return MultiLobe(f"{material} ({models[at]} fit)", lobes)
+    except MaterialError as error:
+        raise FormatError(f"{path}: {error}") from error
+
+
+def members(path: Path, data: bytes) -> list[str]:
+    """The models of the fits in a file. Raises FormatError."""
+    return list(dict.fromkeys(_models(path, data)[2]))
+
+
+def _models(path: Path, data: bytes) -> tuple[dict[str, Any], list[dict[str, Any]], list[str]]:
+    """What is in the file, its fits, and the model of each."""
     try:
         found = json.loads(data)
     except (ValueError, RecursionError) as error:
@@ -54,17 +73,9 @@ def parse(path: Path, data: bytes, member: str = "") -> MultiLobe:
         raise FormatError(f'{path}: expected fits as `sommerl fit` writes them, with "{KEY}": {VERSION}, {what}')
     fits = [_mapping(path, "fits", fit) for fit in _sequence(path, "fits", top.get("fits"))]
     models = [_name(path, "model", fit.get("model")) for fit in fits]
-    material = _name(path, "material", top.get("material"))
     if not fits:
         raise FormatError(f"{path}: fits: expected one or more, found none")
-    if member and member not in models:
-        raise FormatError(f"{path}: expected one of {', '.join(models[:20])}, found {member}")
-    at = models.index(member) if member else 0
-    try:
-        lobes = [_lobe(path, lobe) for lobe in _sequence(path, "parameters", fits[at].get("parameters"))]
-        return MultiLobe(f"{material} ({models[at]} fit)", lobes)
-    except MaterialError as error:
-        raise FormatError(f"{path}: {error}") from error
+    return top, fits, models
 
 
 def _lobe(path: Path, found: Any) -> Lobe:
@@ -113,5 +124,5 @@ FORMAT = Format(
     sniff=looks_like,
     read=parse,
     largest=LARGEST_FILE,
-    members=True,
+    members=members,
 )

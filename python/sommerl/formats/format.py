@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,10 @@ class Format:
     read: makes the material from a file's path and bytes, and, if `members`, from the name of a material in the file,
         "" for the first or only one. Raises FormatError for what is not in this format.
     largest: the most bytes of a file that is read.
-    members: whether a file may hold several materials, so that FILE:NAME is one of them.
+    members: of a format whose files may hold several materials, so that FILE:NAME is one of them: their names, from a
+        file's path and bytes. Raises FormatError as `read` does.
+    parts: of a format in which several files may be one material, any of which names it: all of them, in an order that
+        is always the same, from the path of one. What it gives of other files is that path alone.
     write: writes a material to a path, and returns what the file holds: that material, or a table made from it.
     compressed: whether it is written from compressed materials alone.
     names_source: whether a file that is written names the material's own file and holds nothing of it. `write` then
@@ -35,7 +38,8 @@ class Format:
     sniff: Callable[[bytes], bool] | None = None
     read: Callable[..., Brdf] | None = None
     largest: int = 0
-    members: bool = False
+    members: Callable[[Path, bytes], Sequence[str]] | None = None
+    parts: Callable[[Path], Sequence[Path]] | None = None
     write: Callable[[Any, Path], Any] | None = None
     compressed: bool = False
     names_source: bool = False

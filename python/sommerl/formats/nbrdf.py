@@ -48,11 +48,31 @@ def parse(path: Path, data: bytes, member: str = "") -> NeuralBrdf:
         raise FormatError(f"{path}: {error}") from error
 
 
-def _npy(path: Path, data: bytes) -> NeuralBrdf:
+def members(arrays: Mapping[str, NDArray[Any]]) -> list[str]:
+    """The names of the materials in an .npz file's arrays; "" alone where the arrays are those of one."""
+    if set(ARRAYS) <= arrays.keys():
+        return [""]
+    return [name for name, array in arrays.items() if array.size == WEIGHTS] or [""]
+
+
+def parts(path: Path) -> list[Path]:
+    """All files of the material that a .npy file is of: six, or that one."""
+    beside = _beside(path)
+    return list(beside.values()) if beside and all(map(os.path.isfile, beside.values())) else [path]
+
+
+def _beside(path: Path) -> dict[str, Path]:
+    """The six files of which NAME_fc1.npy and the like is one, by their arrays; empty for other names."""
     name, mark, part = path.stem.rpartition("_")
-    if not mark or part not in ARRAYS:
+    return {each: path.with_name(f"{name}_{each}.npy") for each in ARRAYS} if mark and part in ARRAYS else {}
+
+
+def _npy(path: Path, data: bytes) -> NeuralBrdf:
+    beside = _beside(path)
+    if not beside:
         return NeuralBrdf.from_flat(_numbers(read_npy(path, data)).reshape(-1), name=visible(path.stem))
-    beside = {other: path.with_name(f"{name}_{other}.npy") for other in ARRAYS if other != part}
+    name, _, part = path.stem.rpartition("_")
+    del beside[part]
     missing = [file.name for file in beside.values() if not os.path.isfile(file)]
     if missing:
         raise FormatError(f"{path}: expected {missing[0]} beside it, found none")
@@ -63,8 +83,8 @@ def _npy(path: Path, data: bytes) -> NeuralBrdf:
 def _npz(path: Path, arrays: Mapping[str, NDArray[Any]], member: str) -> NeuralBrdf:
     if set(ARRAYS) <= arrays.keys():
         return _layers(arrays, visible(path.stem))
-    names = [name for name, array in arrays.items() if array.size == WEIGHTS]
-    if not names:
+    names = members(arrays)
+    if names == [""]:
         raise FormatError(f"{path}: expected arrays {', '.join(ARRAYS)}, or of {WEIGHTS} weights each, found none")
     if not member and len(names) > 1:
         raise FormatError(f"{path}: expected the name of one of its {len(names)} materials, as {path}:{names[0]}")

@@ -23,6 +23,11 @@ def _archive(path: Path, data: bytes, member: str) -> Brdf:
     return samples.parse(path, data) if sampled else nbrdf.parse(path, data, member)
 
 
+def _members(path: Path, data: bytes) -> list[str]:
+    arrays = numpy_files.read_npz(path, data)
+    return [""] if samples.are_columns(arrays) else nbrdf.members(arrays)
+
+
 ARRAY = Format(
     "NumPy array",
     (".npy",),
@@ -30,6 +35,7 @@ ARRAY = Format(
     sniff=numpy_files.is_array,
     read=_array,
     largest=numpy_files.LARGEST_FILE,
+    parts=nbrdf.parts,
 )
 ARCHIVE = Format(
     "NumPy archive",
@@ -38,5 +44,5 @@ ARCHIVE = Format(
     sniff=numpy_files.is_archive,
     read=_archive,
     largest=numpy_files.LARGEST_FILE,
-    members=True,
+    members=_members,
 )

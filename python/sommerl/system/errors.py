@@ -5,6 +5,7 @@ from __future__ import annotations
 from .visible import visible
 
 LONGEST = 2000  # characters of a message; a longer one is cut off
+LONGEST_UNEXPECTED = 300  # characters of what an error that nobody thought of says
 
 
 class SommerlError(Exception):
@@ -28,3 +29,14 @@ class OptionError(SommerlError):
 
 class MissingDependencyError(SommerlError):
     """An optional package, or a library like LLVM, is needed and not installed."""
+
+
+def unexpected(error: BaseException) -> str:
+    """What an error is that is none of Sommerl's own, for a sentence."""
+    try:
+        text = " ".join(str(error).split())
+    except Exception:  # it may be anybody's
+        text = ""
+    text = visible(text if len(text) <= LONGEST_UNEXPECTED else f"{text[:LONGEST_UNEXPECTED]}…")
+    found = type(error).__name__ + (f" ({text})" if text else "")
+    return f"something went wrong that Sommerl did not expect: {found}"

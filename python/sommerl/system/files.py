@@ -131,6 +131,14 @@ def remove_left_over(path: Path) -> None:
         _remove_if_left(temporary)
 
 
+def remove_all_left_over(folder: Path) -> None:
+    """Removes temporary files that were left by runs that were killed, of any name, in a folder and all below it."""
+    for place, _, names in os.walk(folder):
+        for name in names:
+            if re.fullmatch(r"\.sommerl-[0-9a-f]{16}-\w+", name):
+                _remove_if_left(os.path.join(place, name))
+
+
 def _target(path: Path) -> Path | None:
     """The file to write for a path, with symbolic links followed; None for a pipe or a character device.
 

@@ -193,6 +193,7 @@ class Fitter:
         """The material's values in the cube-root domain at places (…) on the fine grid, (…, 3); 0 below the horizon."""
         wi, wo = directions(*angles_at(x, y, z, **self.folds))
         f_r = self._brdf.eval(np.stack(wi, axis=-1), np.stack(wo, axis=-1))
+        f_r[np.minimum(wi[2], wo[2]) <= LOWEST_COSINE] = 0.0  # on the horizon, rounding decides what is above it
         return np.cbrt(f_r * (damped(wi, wo, smooth=True) / self.scale)[..., None])
 
     def _draw(self, count: int) -> None:

@@ -1,0 +1,18 @@
+"""The command `library`: materials by the thousand. Each of its sub-commands is in a module of its own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from . import library_build, library_verify
+
+SUMMARY = "Materials by the thousand in one folder: built by many processes, and checked."
+SUBCOMMANDS = (library_build, library_verify)  # in the order in which help lists them
+
+
+def arguments(add: Any) -> None:
+    """Adds the command, with its sub-commands, to the command line."""
+    parser = add("library", help=SUMMARY[0].lower() + SUMMARY[1:].rstrip("."), description=SUMMARY)
+    add_to = parser.add_subparsers(metavar="COMMAND", dest="subcommand", required=True).add_parser
+    for module in SUBCOMMANDS:
+        module.arguments(add_to)
