@@ -565,7 +565,7 @@ READERS = [
         "smrl-cells", ".smrl", cells_seeds, sommerl.load, smrl.LONGEST_FILE, evaluated,
         inflated(stream_of_cells),
     ),
-    Reader("library", ".smrlib", library_seeds, in_library, smrl.LONGEST_FILE, evaluated, below_sums),
+    Reader("library", ".smrlib", library_seeds, in_library, smrlib.MOST_READ, evaluated, below_sums),
     Reader(
         "fbrdf", ".fbrdf", fbrdf_seeds, sommerl.load, fbrdf.LONGEST_FILE, evaluated, inflated(stream_of_factors)
     ),

@@ -6,10 +6,12 @@ from pathlib import Path
 
 from ..compression.material import SomManBrdf
 from ..compression.smrl import file
-from ..compression.smrl.library_file import LibraryFile, looks_like
+from ..compression.smrl.library_file import MOST_INFLATED, LibraryFile, looks_like
 from ..system.door import File
 from ..system.errors import FormatError, told_of
 from .format import Format
+
+MOST_READ = MOST_INFLATED + file.LONGEST_FILE + 2**12  # bytes: index, one material, and the head
 
 
 def parse(path: Path, opened: File, member: str) -> SomManBrdf:
@@ -36,6 +38,7 @@ FORMAT = Format(
     "compressed materials, which `library pack` writes; FILE.smrlib:NAME is one",
     sniff=looks_like,
     read=parse,
+    largest=MOST_READ,
     opened=True,
     members=names,
 )
