@@ -38,10 +38,11 @@ import sommerl
 from sommerl import Lattice
 from sommerl.compression.palette import GainsAndShapes
 from sommerl.compression.smrl import file as smrl
+from sommerl.compression.smrl import library_file
 from sommerl.compression.smrl.codes import gain_values, shape_values
 from sommerl.factored import file as fbrdf
 from sommerl.factored.material import COLUMNS, ELEVATIONS, ROWS, FactoredBrdf
-from sommerl.formats import cornell, fits, merl, nbrdf, numpy_files, samples, tensor, text
+from sommerl.formats import cornell, fits, merl, nbrdf, numpy_files, samples, smrlib, tensor, text
 from sommerl.models.multi_lobe import FAMILIES, Lobe
 from sommerl.models.nbrdf import SHAPES, WEIGHTS
 from sommerl.reflectance.nodes import NodeLattice
@@ -315,6 +316,49 @@ def stream_of_cells(whole: bytes) -> int:
     return at + smrl.CELLS_HEAD.size
 
 
+def library_seeds() -> list[bytes]:
+    """Libraries of some materials, and of one."""
+    materials = {f"{kind}/{number}": data for kind, seeds in (("nodes", nodes_seeds), ("cells", cells_seeds))
+                 for number, data in enumerate(seeds())}  # fmt: skip
+    files: list[bytes] = []
+    for names in (list(materials), list(materials)[:1]):
+        out = io.BytesIO()
+        entries = [
+            library_file.Entry(name, f"{name}.bsdf", 7, "ab" * 32, {"seed": 1}, {"psnr_soft_db": 50.0})
+            for name in names
+        ]
+        library_file.write(out, entries, materials.__getitem__)
+        files.append(out.getvalue())
+    return files
+
+
+def in_library(path: Path) -> Any:
+    """The last material in a library."""
+    with door.opened(path) as file:
+        names = smrlib.names(path, file)
+        return smrlib.parse(path, file, names[-1] if names else "")
+
+
+def below_sums(rng: random.Random, whole: bytes, mutate: Mutate) -> bytes:
+    """A library, damaged below its checksums: in the table of sections, in the index, or in what that inflates to."""
+    head, count = library_file.HEAD.size, library_file.COUNT.size
+    start = head + count + 2 * library_file.SECTION.size
+    size = library_file.SECTION.unpack_from(whole, head + count)[2]
+    index, materials = whole[start : start + size], whole[start + size :]
+    kind = rng.randrange(3)
+    if kind == 1:
+        index = mutate(rng, index)
+    elif kind == 2:
+        front = library_file.INDEX_HEAD.size
+        index = index[:front] + sealed_file.deflated(mutate(rng, zlib.decompress(index[front:], -zlib.MAX_WBITS)))
+    rows = ((library_file.INDEX, index, zlib.crc32(index)), (library_file.MATERIALS, materials, 0))
+    table = library_file.COUNT.pack(2)
+    table += b"".join(library_file.SECTION.pack(each, 1, len(data), crc) for each, data, crc in rows)
+    if kind == 0:
+        table = mutate(rng, table)
+    return library_file.HEAD.pack(library_file.MAGIC, 1, zlib.crc32(table)) + table + index + materials
+
+
 def fbrdf_seeds() -> list[bytes]:
     rng = np.random.default_rng(0)
     parts = (rng.random(shape) for shape in ((ELEVATIONS, 2, 3), (ROWS, 2, 2), (COLUMNS, 2, 2), (2, 2)))
@@ -521,6 +565,7 @@ READERS = [
         "smrl-cells", ".smrl", cells_seeds, sommerl.load, smrl.LONGEST_FILE, evaluated,
         inflated(stream_of_cells),
     ),
+    Reader("library", ".smrlib", library_seeds, in_library, smrlib.MOST_READ, evaluated, below_sums),
     Reader(
         "fbrdf", ".fbrdf", fbrdf_seeds, sommerl.load, fbrdf.LONGEST_FILE, evaluated, inflated(stream_of_factors)
     ),

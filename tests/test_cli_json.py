@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers import compact_material, lambertian_table, must_fail, run, run_json
+from library_files import packed
 
 from sommerl import TrainOptions, save, train
 from sommerl.commands import console, info
@@ -36,6 +37,10 @@ LINES = {
     "factor": ("factor nickel -o {}/x.fbrdf --lobes 1 --terms 1", ("`factor`",)),
     "plot": ("plot {}/a.smrl -o {}/x.png --kind theta-h", ("`plot`",)),
     "view": ("view {}/a.smrl -o {}/x.html", ("`view`",)),
+    "library pack": ("library pack {}/library.smrlib -o {}/x.smrlib", ("`library pack`",)),
+    "library list": ("library list {}/library.smrlib", ("`library list`, `find` and `sheet`",)),
+    "library find": ("library find {}/library.smrlib --like nickel", ("`library list`, `find` and `sheet`",)),
+    "library sheet": ("library sheet {}/library.smrlib -o {}/x.html", ("`library list`, `find` and `sheet`",)),
     "completion": ("completion bash", ("`completion`",)),
 }
 
@@ -46,6 +51,7 @@ def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("materials")
     save(train(lambertian_table(0.5), TrainOptions(clusters=1, epochs=1))[0], folder / "a.smrl")
     save(compact_material(NodeLattice((0, 180), (0, 0), ((0, 180),), ((0,),)), 2, 2), folder / "compact.smrl")
+    (folder / "library.smrlib").write_bytes(packed())
     return folder
 
 

@@ -2,6 +2,7 @@
 
 import os
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from helpers import must_fail, run, run_json
 
 from sommerl.commands.cli import main
 
+LIBRARY = Path(__file__).parent / "golden" / "library-1.smrlib"
 SMALL = ["--size", "8", "--spp", "1"]
 # Of each command its options, with {} for the folder, and every file that it writes.
 COMMANDS = {
@@ -17,6 +19,9 @@ COMMANDS = {
     "compress several": (["compress", "nickel", "chrome", "-o", "{}"], ["nickel.smrl", "chrome.smrl"]),
     "convert": (["convert", "nickel", "{}/x.XML"], ["x.XML"]),
     "convert samples": (["convert", "{}/in/x.csv", "{}/x.binary"], ["x.binary", "x.coverage.png"]),
+    "blend": (["blend", "nickel", "chrome", "0.5", "-o", "{}/x.smrl"], ["x.smrl"]),
+    "library pack": (["library", "pack", str(LIBRARY), "-o", "{}/x.smrlib"], ["x.smrlib"]),
+    "library sheet": (["library", "sheet", str(LIBRARY), "-o", "{}/x.html"], ["x.html"]),
     "compare": (["compare", "nickel", "chrome", "-o", "{}/x.png", *SMALL], ["x.png"]),
     "fit": (["fit", "nickel", "-o", "{}/x.json", "--picture", "{}/x.png"], ["x.json", "x.png"]),
     "factor": (["factor", "nickel", "-o", "{}/x.fbrdf"], ["x.fbrdf"]),
@@ -70,6 +75,8 @@ def test_a_command_that_replaces_it_is_noticed(capsys, tmp_path):
 QUICK = {
     "compress": ["--clusters", "4", "--epochs", "1"],
     "convert": [],
+    "library pack": [],
+    "library sheet": [],
     "convert samples": ["--overwrite"],  # of a MERL table, there is no telling who wrote it
     "render": [],
     "render to EXR": [],
@@ -89,7 +96,7 @@ def test_what_a_command_wrote_it_replaces(capsys, tmp_path, command):
 
 def test_every_command_that_writes_has_the_option(capsys):
     for command, (options, _) in COMMANDS.items():
-        assert "--overwrite" in run(capsys, options[0], "--help")[1], command
+        assert "--overwrite" in run(capsys, *options[: 1 + (options[0] == "library")], "--help")[1], command
     assert "--overwrite" not in run(capsys, "info", "--help")[1]
 
 

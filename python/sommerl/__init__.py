@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from .compression.paper.train import TrainReport, train
     from .compression.smrl.file import save
     from .formats.load import load, load_table
+    from .library.library import Library
     from .models.builtin import NAMES, builtin, builtin_table
+    from .reflectance.blend import blend
     from .reflectance.brdf import Brdf
     from .reflectance.cells import MERL, Lattice
     from .reflectance.reciprocal import reciprocal
@@ -33,10 +35,12 @@ __all__ = [
     "Brdf",
     "BrdfTable",
     "Lattice",
+    "Library",
     "SomManBrdf",
     "SommerlError",
     "TrainOptions",
     "TrainReport",
+    "blend",
     "builtin",
     "builtin_table",
     "compress",
@@ -55,10 +59,12 @@ _MODULES = {
     "Brdf": "reflectance.brdf",
     "BrdfTable": "reflectance.table",
     "Lattice": "reflectance.cells",
+    "Library": "library.library",
     "SomManBrdf": "compression.material",
     "SommerlError": "system.errors",
     "TrainOptions": "compression.paper.options",
     "TrainReport": "compression.paper.train",
+    "blend": "reflectance.blend",
     "builtin": "models.builtin",
     "builtin_table": "models.builtin",
     "compress": "render.compress",

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import rgl_files
 from helpers import complaint, lambertian_table, must_fail, random_directions, run
+from library_files import MATERIALS, packed
 
 from sommerl import TrainOptions, load, train
 from sommerl.compression.smrl import file as smrl_file
@@ -62,6 +63,7 @@ FIELDS = [(name, "<f8") for name in ("theta_i", "phi_i", "theta_o", "phi_o", "r"
 # A file of each format that is read, by the name of the format.
 FILES = {
     "Sommerl": lambda _: smrl_file.encode(train(lambertian_table(), TrainOptions(clusters=1, epochs=1))[0]),
+    "library": lambda _: packed({"cells": MATERIALS["cells"]}),
     "factored BRDF": lambda _: fbrdf_file.encode(factored_brdfs.even()),
     "MERL": lambda _: merl(),
     "RGL": lambda _: rgl_files.content(),

@@ -168,6 +168,18 @@ def byte_count(text: str) -> int:
     return int(count)
 
 
+def ranged(text: str) -> tuple[float, float]:
+    """LOW..HIGH, or one of the two, from 0 to 1."""
+    low, _, high = text.partition("..")
+    try:
+        found = float(low or 0), float(high or 1)
+    except ValueError:
+        found = 1.0, 0.0
+    if ".." not in text or not 0 <= found[0] <= found[1] <= 1:
+        raise ArgumentTypeError(f"expected LOW..HIGH from 0 to 1, like 0.5..1 or ..0.2, found {text}")
+    return found
+
+
 def several(read: Callable[[str], int]) -> Callable[[str], tuple[int, ...]]:
     """What reads numbers between commas, of each of which `read` makes one."""
 

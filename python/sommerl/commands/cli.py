@@ -14,7 +14,7 @@ from ..formats.registry import listed, readable
 from ..models.builtin import NAMES
 from ..system import threads
 from ..system.files import replacing_files
-from . import compare, completion, compress, convert, demo, factor, fit, info, library, paper, plot, render, view
+from . import blend, compare, completion, compress, convert, demo, factor, fit, info, library, paper, plot, render, view
 from .arguments import WritingArguments, read
 from .console import warn
 from .folders import empty_ones_removed
@@ -42,7 +42,7 @@ Examples:
 
 
 # In the order in which help lists them.
-COMMANDS = (demo, compress, info, convert, compare, fit, factor, render, plot, view, library, paper, completion)
+COMMANDS = (demo, compress, info, convert, blend, compare, fit, factor, render, plot, view, library, paper, completion)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

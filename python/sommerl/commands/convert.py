@@ -61,8 +61,13 @@ def arguments(add: Any) -> None:
 
 
 def convert(options: ConvertArguments) -> dict[str, Any]:
-    kind = _checked(options)
+    kind = checked(options)
     brdf = load(options.input) if options.noise is None else builtin_table(options.input, noise=options.noise)
+    return converted(brdf, kind, options)
+
+
+def converted(brdf: Brdf, kind: Format, options: ConvertArguments) -> dict[str, Any]:
+    """Writes a material in a format, and says what came of it; `input` is how it is called."""
     output: Path = options.output
     kept = reciprocal(brdf) if options.reciprocal else brdf
     report = {} if kind.names_source else _report(brdf, output)
@@ -95,7 +100,7 @@ def _compact(options: ConvertArguments) -> CompactOptions:
         return CompactOptions(target_size=options.target_size)
 
 
-def _checked(options: ConvertArguments) -> Format:
+def checked(options: ConvertArguments) -> Format:
     """The format to write. Raises OptionError for what cannot be asked for."""
     if options.noise is not None and (options.input not in NAMES or Path(options.input).exists()):
         raise OptionError(f"--noise: expected a built-in material, found {options.input}")

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from . import library_build, library_verify
+from . import library_build, library_find, library_list, library_pack, library_sheet, library_verify
 
-SUMMARY = "Materials by the thousand in one folder: built by many processes, and checked."
-SUBCOMMANDS = (library_build, library_verify)  # in the order in which help lists them
+SUMMARY = "Materials by the thousand: built by many processes, checked, packed into one file, listed and found."
+# In the order in which help lists them.
+SUBCOMMANDS = (library_build, library_verify, library_pack, library_list, library_find, library_sheet)
 
 
 def arguments(add: Any) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..reflectance.brdf import Brdf
+from ..system.door import File
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,8 @@ class Format:
     read: makes the material from a file's path and bytes, and, if `members`, from the name of a material in the file,
         "" for the first or only one. Raises FormatError for what is not in this format.
     largest: the most bytes of a file that is read.
+    opened: whether `read` and `members` take the open file (`door.File`) in place of its bytes, and read what they need
+        of it.
     members: of a format whose files may hold several materials, so that FILE:NAME is one of them: their names, from a
         file's path and bytes. Raises FormatError as `read` does.
     parts: of a format in which several files may be one material, any of which names it: all of them, in an order that
@@ -38,11 +41,16 @@ class Format:
     sniff: Callable[[bytes], bool] | None = None
     read: Callable[..., Brdf] | None = None
     largest: int = 0
-    members: Callable[[Path, bytes], Sequence[str]] | None = None
+    opened: bool = False
+    members: Callable[[Path, Any], Sequence[str]] | None = None
     parts: Callable[[Path], Sequence[Path]] | None = None
     write: Callable[[Any, Path], Any] | None = None
     compressed: bool = False
     names_source: bool = False
+
+    def content(self, file: File) -> Any:
+        """What `read` and `members` take of a file. Raises FormatError if it is too long or cannot be read."""
+        return file if self.opened else file.read(self.largest)
 
     def __str__(self) -> str:
         return f"{self.name} {' '.join(self.extensions)}"

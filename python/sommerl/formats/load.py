@@ -17,8 +17,9 @@ from .registry import recognised
 def load(source: str | Path) -> Brdf:
     """The material in a file of any known format, recognised by its content, or the built-in one of that name.
 
-    Of an archive of neural BRDFs, "FILE.npz:NAME" is one; of a file of fits, "FILE.json:MODEL". Raises FormatError for
-    a file in no known format, MaterialError for a name that is neither file nor built-in.
+    Of a library of materials, "FILE.smrlib:NAME" is one; of an archive of neural BRDFs, "FILE.npz:NAME"; of a file of
+    fits, "FILE.json:MODEL". Raises FormatError for a file in no known format, MaterialError for a name that is neither
+    file nor built-in.
     """
     path, member = split_member(source)
     if not os.path.isfile(path) and str(source) in NAMES:
@@ -31,9 +32,9 @@ def load(source: str | Path) -> Brdf:
         kind = recognised(path, file.head)
         if member and not kind.members:
             raise FormatError(f"{path}: expected an archive of materials, to take {member} from it, found one material")
-        data = file.read(kind.largest)
-    assert kind.read
-    return kind.read(path, data, member) if kind.members else kind.read(path, data)
+        assert kind.read
+        content = kind.content(file)
+        return kind.read(path, content, member) if kind.members else kind.read(path, content)
 
 
 def load_table(source: str | Path) -> BrdfTable:

@@ -6,12 +6,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ..system.errors import FormatError
-from . import cornell, fbrdf, fits, merl, nbrdf, numpy_materials, rgl, samples, scene, smrl, source_code
+from . import cornell, fbrdf, fits, merl, nbrdf, numpy_materials, rgl, samples, scene, smrl, smrlib, source_code
 from .format import Format
 
 # In the order in which help and docs list them.
 FORMATS: list[Format] = [
     smrl.FORMAT,
+    smrlib.FORMAT,
     fbrdf.FORMAT,
     merl.FORMAT,
     rgl.FORMAT,

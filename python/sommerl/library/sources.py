@@ -102,7 +102,7 @@ def _members(path: Path) -> Sequence[str]:
     """The materials in a file, by the format that it is in, whatever its extension says."""
     with door.opened(path) as file:
         kind = registry.recognised(path, file.head)
-        return kind.members(path, file.read(kind.largest)) if kind.members else [""]
+        return kind.members(path, kind.content(file)) if kind.members else [""]
 
 
 def _files(folder: Path, output: Path, faults: list[tuple[str, str]], warn: Callable[[str], None]) -> Iterator[Path]:

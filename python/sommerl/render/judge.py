@@ -95,6 +95,12 @@ def under_one_lamp(brdf: Brdf, side: int) -> Image:
     return Image(found.reshape(side, side, 3), inside.reshape(side, side))
 
 
+def softly_lit(brdf: Brdf, normals: Vectors, sky: int, of_a_light: int) -> Values:
+    """The radiance of a sphere's pixels in soft light of that many lamps, (n, 3): quicker, and more speckled where a
+    material mirrors. normals: of the pixels, (n, 3), x to the right, y up, z towards the viewer."""
+    return _lit(brdf, normals, *_lamps(sky, of_a_light))
+
+
 def _lit(brdf: Brdf, normals: Vectors, lamps: Vectors, power: Values) -> Values:
     """The radiance of pixels, (n, 3). normals: theirs, (n, 3). lamps: directions (k, 3). power: of the lamps, radiance
     times solid angle (k, 3)."""
@@ -125,20 +131,20 @@ def _frames(normal: Vectors) -> tuple[NDArray[np.float64], Vectors]:
     return frame, frame[:, :, 2]
 
 
-def _lamps() -> tuple[Vectors, Values]:
+def _lamps(sky: int = SKY, of_a_light: int = OF_A_LIGHT) -> tuple[Vectors, Values]:
     """Lamps for the sky and for each light of the built-in environment: directions and radiance times solid angle."""
-    z, phi = 1.0 - (np.arange(SKY) + 0.5) / SKY * 2, _turns(SKY)
-    sky = np.stack([np.sqrt(1 - z * z) * np.cos(phi), z, np.sqrt(1 - z * z) * np.sin(phi)], axis=-1)
+    z, phi = 1.0 - (np.arange(sky) + 0.5) / sky * 2, _turns(sky)
+    towards = np.stack([np.sqrt(1 - z * z) * np.cos(phi), z, np.sqrt(1 - z * z) * np.sin(phi)], axis=-1)
     up = np.clip(z, 0, 1)[:, None]
     radiance = np.where(z[:, None] > 0, np.array(HORIZON) + (np.array(ZENITH) - HORIZON) * up, 0.0)
-    found = [(sky, radiance * (4 * np.pi / SKY))]
+    found = [(towards, radiance * (4 * np.pi / sky))]
     for elevation, azimuth, sigma, colour in LIGHTS:
         width = np.radians(sigma)
         # Equal shares of a Gaussian about the light's centre.
-        angle = width * np.sqrt(-2 * np.log(1 - (np.arange(OF_A_LIGHT) + 0.5) / OF_A_LIGHT))
-        about = np.stack(spherical(angle, _turns(OF_A_LIGHT)), axis=-1)
-        power = np.array(colour) * (2 * np.pi * width**2 / OF_A_LIGHT)
-        found.append((about @ _towards(elevation, azimuth), np.tile(power, (OF_A_LIGHT, 1))))
+        angle = width * np.sqrt(-2 * np.log(1 - (np.arange(of_a_light) + 0.5) / of_a_light))
+        about = np.stack(spherical(angle, _turns(of_a_light)), axis=-1)
+        power = np.array(colour) * (2 * np.pi * width**2 / of_a_light)
+        found.append((about @ _towards(elevation, azimuth), np.tile(power, (of_a_light, 1))))
     directions, powers = zip(*found, strict=True)
     return np.concatenate(directions), np.concatenate(powers)
 

@@ -111,17 +111,22 @@ class HalfVectorSampler(Sampler):
 
         theta: the viewer's polar angles [rad], (...). Returns (..., 3). Raises ValueError for angles outside [0, π/2].
         """
-        angles = np.asarray(theta, np.float64)
-        known = np.isfinite(angles)
-        if (known & ((angles < 0) | (angles > PI / 2))).any():
-            raise ValueError("albedo: polar angles have to be from 0 to π/2, and some are not")
-        found = np.full((angles.size, 3), np.nan)
-        for number in np.flatnonzero(known):
-            cos_o = np.cos(angles.reshape(-1)[number : number + 1])
-            sides = (1.0,) if self.brdf.mirrored else (1.0, -1.0)
-            light = [_light(self.brdf, cos_o, points, side)[0].mean(axis=(0, 1, 2, 3)) for side in sides]
-            found[number] = np.mean(light, axis=0)
-        return found.reshape(*angles.shape, 3)
+        return albedo(self.brdf, theta, points)
+
+
+def albedo(brdf: Brdf, theta: ArrayLike, points: int = EXACT) -> NDArray[np.float64]:
+    """As `HalfVectorSampler.albedo`, for which no sampler has to be fitted."""
+    angles = np.asarray(theta, np.float64)
+    known = np.isfinite(angles)
+    if (known & ((angles < 0) | (angles > PI / 2))).any():
+        raise ValueError("albedo: polar angles have to be from 0 to π/2, and some are not")
+    found = np.full((angles.size, 3), np.nan)
+    for number in np.flatnonzero(known):
+        cos_o = np.cos(angles.reshape(-1)[number : number + 1])
+        sides = (1.0,) if brdf.mirrored else (1.0, -1.0)
+        light = [_light(brdf, cos_o, points, side)[0].mean(axis=(0, 1, 2, 3)) for side in sides]
+        found[number] = np.mean(light, axis=0)
+    return found.reshape(*angles.shape, 3)
 
 
 def albedos(brdf: Brdf) -> NDArray[np.float64]:

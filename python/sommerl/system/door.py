@@ -14,6 +14,7 @@ from collections.abc import Generator
 from contextlib import ExitStack, contextmanager
 from io import FileIO
 from pathlib import Path
+from threading import Lock
 
 from .errors import FormatError
 
@@ -36,11 +37,35 @@ class File:
     def __init__(self, path: Path, stream: FileIO) -> None:
         self.path, self._stream = path, stream
         self.head = stream.read(HEAD_BYTES) or b""
+        self._turn = Lock()  # the stream has one place
+
+    @property
+    def length(self) -> int:
+        """What the system says of the file's length [bytes]."""
+        return os.fstat(self._stream.fileno()).st_size
+
+    def part(self, start: int, count: int) -> bytes:
+        """So many bytes from a place on, or as many as there are; threads may ask at the same time.
+
+        Files are not mapped into memory: reading what somebody else cuts off meanwhile would end the process. Raises
+        FormatError if the file cannot be read.
+        """
+        end = start + count
+        if end <= len(self.head):
+            return self.head[start:end]
+        known = self.head[start:]
+        with self._turn, _readable(self.path):
+            self._stream.seek(start + len(known))
+            parts, missing = [known], count - len(known)
+            while missing and (part := self._stream.read(min(missing, STEP))):
+                parts.append(part)
+                missing -= len(part)
+        return b"".join(parts)
 
     def read(self, most: int) -> bytes:
         """The whole content. Call it once. Raises FormatError if it is longer than `most` bytes or cannot be read."""
         with _readable(self.path):
-            length = os.fstat(self._stream.fileno()).st_size
+            length = self.length
             if length > most:
                 raise FormatError(f"{self.path}: expected at most {most} bytes, found {length}")
             parts, size = [self.head], len(self.head)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+from contextlib import contextmanager
+
 from .visible import visible
 
 LONGEST = 2000  # characters of a message; a longer one is cut off
@@ -40,3 +43,13 @@ def unexpected(error: BaseException) -> str:
     text = visible(text if len(text) <= LONGEST_UNEXPECTED else f"{text[:LONGEST_UNEXPECTED]}…")
     found = type(error).__name__ + (f" ({text})" if text else "")
     return f"something went wrong that Sommerl did not expect: {found}"
+
+
+@contextmanager
+def told_of(name: object) -> Generator[None]:
+    """Within the block, errors of a format that do not name the file get its name before them."""
+    try:
+        yield
+    except FormatError as error:
+        text = str(error)
+        raise error if text.startswith(visible(f"{name}: ")) else FormatError(f"{name}: {text}") from error

@@ -32,6 +32,7 @@ if sys.platform != "win32":
 # WITHIN bytes. Every new format needs a line here, or commands would not replace their own files.
 MARKS: tuple[tuple[bytes, bytes], ...] = (
     (b"SMRL", b""),
+    (b"SMLB", b""),
     (b"FBRD", b""),
     (b"SMRP", b""),
     (b"\x89PNG\r\n\x1a\n", rb'tEXtSoftware\0"?Sommerl'),

@@ -12,7 +12,7 @@ import html
 import json
 import re
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 
 from ..system.first_few import first_few
@@ -26,23 +26,40 @@ STYLES = ("style.css", "panels.css")
 def page(materials: Sequence[Held]) -> str:
     """The page, as HTML."""
     title = first_few([visible(one.label, 60) for one in materials if one.step == REFERENCE])
+    return _filled(html.escape(title or "Materials"), as_json([one.packed() for one in materials]))
+
+
+def template() -> str:
+    """The page with @title@ and @materials@ in place of its title, in HTML, and of the list of `Held.packed`, in JSON
+    without the character <."""
+    return _filled("@title@", "@materials@")
+
+
+def _filled(title: str, materials: str) -> str:
     values = {
         "policy": policy(),
-        "title": html.escape(title or "Materials"),
+        "title": title,
         "style": _style(),
-        "materials": _json([one.packed() for one in materials]),
+        "materials": materials,
         "packed": _packed(),
         "boot": _boot(),
     }
-    return re.sub(r"@(\w+)@", lambda found: values[found[1]], module("page.html"))
+    return filled(module("page.html"), values)
+
+
+def filled(text: str, values: Mapping[str, str]) -> str:
+    """A text with values in place of their names between two @."""
+    return re.sub(r"@(\w+)@", lambda found: values[found[1]], text)
 
 
 @cache
-def policy() -> str:
-    """The content-security policy: what is in the page, and nothing from elsewhere."""
-    allowed = " ".join(f"'{_digest(text)}'" for text in (_boot(), script()))
+def policy(scripts: tuple[str, ...] = (), styles: tuple[str, ...] = ()) -> str:
+    """The content-security policy: what is in the page, and nothing from elsewhere. scripts, styles: of a page that
+    opens this one, whose policy holds for both."""
+    allowed = " ".join(f"'{_digest(text)}'" for text in (_boot(), script(), *scripts))
+    style = " ".join(f"'{_digest(text)}'" for text in (_style(), *styles))
     return (
-        f"default-src 'none'; script-src {allowed}; style-src '{_digest(_style())}'; img-src data: blob:; "
+        f"default-src 'none'; script-src {allowed}; style-src {style}; img-src data: blob:; "
         "worker-src blob:; base-uri 'none'; form-action 'none'"
     )
 
@@ -55,22 +72,22 @@ def _packed() -> str:
 
 @cache
 def _style() -> str:
-    return _within("style", "\n".join(module(name) for name in STYLES))
+    return within("style", "\n".join(module(name) for name in STYLES))
 
 
 @cache
 def _boot() -> str:
-    return _within("script", module("boot.js"))
+    return within("script", module("boot.js"))
 
 
-def _within(element: str, text: str) -> str:
+def within(element: str, text: str) -> str:
     """A text that is to be in an element as it is. Raises ValueError if the element would end in it, or begin anew."""
     if re.search(rf"</{element}|<!--", text, re.IGNORECASE):
         raise ValueError(f"expected a text without </{element}> and <!--, found one")
     return text
 
 
-def _json(value: object) -> str:
+def as_json(value: object) -> str:
     """JSON that no script element ends at."""
     return json.dumps(value).replace("<", "\\u003c")
 

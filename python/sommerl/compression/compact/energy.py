@@ -13,6 +13,7 @@ from ...reflectance.arrays import Triple
 from ...reflectance.brdf import Brdf
 from ...reflectance.half_diff import directions
 from ...reflectance.nodes import NodeLattice, angles_at
+from ...sampling.half_vector import albedo
 
 # Of viewers, closer together where albedos change fastest
 ANGLES = np.radians((0, 10, 20, 30, 40, 50, 60, 68, 74, 78, 81, 84, 86, 87, 88, 88.5, 89, 89.3, 89.5))
@@ -31,11 +32,11 @@ class EnergyBound:
 
     def __init__(self, source: Brdf, points: int) -> None:
         self._points = points
-        self._most = np.maximum(1.0, ALLOWED * source.sampler.albedo(ANGLES, points=points))
+        self._most = np.maximum(1.0, ALLOWED * albedo(source, ANGLES, points))
 
     def factors(self, brdf: Brdf) -> Floats:
         """By what f_r would have to be multiplied at each of ANGLES, at most 1."""
-        found = brdf.sampler.albedo(ANGLES, points=self._points)
+        found = albedo(brdf, ANGLES, self._points)
         within = (found <= self._most).all()
         return (
             np.ones(len(ANGLES))
