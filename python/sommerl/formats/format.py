@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ class Format:
     largest: the most bytes of a file that is read.
     members: whether a file may hold several materials, so that FILE:NAME is one of them.
     write: writes a material to a path, and returns what the file holds: that material, or a table made from it.
+    write_several: writes any number of compact materials into one file; None if a file holds one material.
     compressed: whether it is written from compressed materials alone.
     names_source: whether a file that is written names the material's own file and holds nothing of it. `write` then
         takes that name in place of the material.
@@ -37,6 +38,7 @@ class Format:
     largest: int = 0
     members: bool = False
     write: Callable[[Any, Path], Any] | None = None
+    write_several: Callable[[Sequence[Any], Path], None] | None = None
     compressed: bool = False
     names_source: bool = False
 
