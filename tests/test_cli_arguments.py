@@ -176,7 +176,7 @@ MISTYPED = [
     ("compress nickel -o x.smrl --target-size 900 --target-psnr 40", "--target-psnr: not allowed beside", "-size"),
     ("compress nickel -o x.smrl --clusters", "--clusters: expected one argument", ""),
     ("paper tabel1", "ITEM: expected table1 or fig5 or fig6 or all, found tabel1", "did you mean table1?"),
-    ("convert nickel x.xml more", "more: expected no further argument", ""),
+    ("compare nickel chrome more", "more: expected no further argument", ""),
     ("convert nickel", "the following arguments are required: OUT", ""),
 ]  # fmt: skip
 

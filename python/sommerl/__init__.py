@@ -11,6 +11,7 @@ TYPE_CHECKING = False  # as in `typing`, which takes long to load
 if TYPE_CHECKING:
     from typing import Any
 
+    from .compression.atlas import Atlas
     from .compression.material import SomManBrdf
     from .compression.paper.options import TrainOptions
     from .compression.paper.train import TrainReport, train
@@ -32,6 +33,7 @@ __version__ = "0.1.0"
 __all__ = [
     "MERL",
     "NAMES",
+    "Atlas",
     "Brdf",
     "BrdfTable",
     "Lattice",
@@ -56,6 +58,7 @@ __all__ = [
 _MODULES = {
     "MERL": "reflectance.cells",
     "NAMES": "models.builtin",
+    "Atlas": "compression.atlas",
     "Brdf": "reflectance.brdf",
     "BrdfTable": "reflectance.table",
     "Lattice": "reflectance.cells",

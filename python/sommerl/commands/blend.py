@@ -52,7 +52,7 @@ def blend(options: BlendArguments) -> dict[str, Any]:
         raise OptionError(f"WEIGHT: expected 0 to 1, found {options.weight:g}")
     called = f"{options.first} + {options.second}"
     asked = {name: getattr(options, name) for name in ("output", "target_size", "reciprocal", "json", "overwrite")}
-    conversion = ConvertArguments(input=called, **asked)  # pyright: ignore[reportArgumentType] # a NewType of str
+    conversion = ConvertArguments(inputs=(called,), **asked)  # pyright: ignore[reportArgumentType] # a NewType of str
     kind = checked(conversion)
     if kind.names_source:
         raise OptionError(f"{options.output}: expected an output that holds the material, found a scene snippet")

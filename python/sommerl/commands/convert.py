@@ -22,8 +22,9 @@ from ..reflectance.table import BrdfTable
 from ..system.errors import OptionError
 from . import answers, console
 from .arguments import Material, WritingArguments, byte_count, named_as_typed, option, positional
-from .checks import check_output
+from .checks import check_apart, check_output
 from .compress import compact_one, compress_one, fitted, trained
+from .inputs import expanded, is_several, read_all
 from .parser import add_command
 from .rows import changed_rows, fact_rows
 
@@ -34,7 +35,11 @@ MOSTLY = 0.5
 class ConvertArguments(WritingArguments):
     """What `convert` is asked for."""
 
-    input: Material = positional("IN", help="the material to convert: a file or a built-in name")
+    inputs: tuple[Material, ...] = positional(
+        "IN",
+        help="the material to convert: a file or a built-in name; for source code, compact ones, folders and patterns, "
+        "too, whose materials become one text",
+    )
     output: Path = positional("OUT", help="a name with one of the extensions below")
     target_size: int | None = option(
         default=None,
@@ -50,18 +55,26 @@ class ConvertArguments(WritingArguments):
         default=None, metavar="SEED", help="add the measurement error of MERL's data to a built-in material"
     )
 
+    @property
+    def input(self) -> Material:
+        """The only material."""
+        return self.inputs[0]
+
 
 def arguments(add: Any) -> None:
     """Adds the command to the command line."""
     summary = "Converts a material into the format that the output's extension names."
     example = """sommerl convert samples.csv samples.binary
   sommerl convert measured.bsdf measured.smrl --target-size 8kB
-  sommerl convert nickel.smrl nickel.h"""
+  sommerl convert nickel.smrl nickel.h
+  sommerl convert nickel.smrl chrome.smrl FOLDER materials.glsl"""
     add_command(add, "convert", convert, ConvertArguments, summary, example, explained=[_formats()])
 
 
 def convert(options: ConvertArguments) -> dict[str, Any]:
     kind = checked(options)
+    if len(options.inputs) > 1 or is_several(options.input):
+        return _convert_several(options, kind)
     brdf = load(options.input) if options.noise is None else builtin_table(options.input, noise=options.noise)
     return converted(brdf, kind, options)
 
@@ -95,6 +108,30 @@ def converted(brdf: Brdf, kind: Format, options: ConvertArguments) -> dict[str, 
     return answers.of_materials([result | report])
 
 
+def _convert_several(options: ConvertArguments, kind: Format) -> dict[str, Any]:
+    """Converts any number of materials into one file."""
+    write, output = kind.write_several, options.output
+    if not write:
+        able = ", ".join(registry.extensions(each for each in registry.writable() if each.write_several))
+        raise OptionError(f"{output}: expected a name that ends in one of {able} for several materials, found another")
+    sources = expanded(options.inputs)
+
+    def read(source: str) -> tuple[str, Brdf]:
+        brdf = load(source)
+        kept = reciprocal(brdf) if options.reciprocal else brdf
+        return source, kept if options.target_size is None else _compressed(kept, options)
+
+    check_apart(output, *sources)
+    found = read_all(sources, options.inputs, read)
+    write([brdf for _, brdf in found], output)
+    size = output.stat().st_size if output.is_file() else None
+    if not options.json:
+        written_as = "through a pipe" if size is None else console.size(size)
+        console.say(f"{len(found)} materials → {output} ({written_as})")
+    rows = [{"input": source, "name": brdf.name} for source, brdf in found]
+    return answers.of_materials(rows, output=str(output), bytes_disk=size)
+
+
 def _compact(options: ConvertArguments) -> CompactOptions:
     with named_as_typed():
         return CompactOptions(target_size=options.target_size)
@@ -102,6 +139,8 @@ def _compact(options: ConvertArguments) -> CompactOptions:
 
 def checked(options: ConvertArguments) -> Format:
     """The format to write. Raises OptionError for what cannot be asked for."""
+    if options.noise is not None and len(options.inputs) > 1:
+        raise OptionError(f"--noise: expected one built-in material, found {len(options.inputs)} inputs")
     if options.noise is not None and (options.input not in NAMES or Path(options.input).exists()):
         raise OptionError(f"--noise: expected a built-in material, found {options.input}")
     if options.noise is not None and options.noise < 0:
@@ -117,7 +156,7 @@ def checked(options: ConvertArguments) -> Format:
         _compact(options)
         if not (kind and kind.compressed):
             raise OptionError(f"--target-size: expected an output that is compressed, found {options.output}")
-    check_output(options.output, registry.extensions(registry.writable()), options.input)
+    check_output(options.output, registry.extensions(registry.writable()), *options.inputs)
     assert kind  # or the check has said which ones there are
     return kind
 

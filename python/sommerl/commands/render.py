@@ -7,14 +7,16 @@ import textwrap
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import lru_cache, partial
+from functools import cache, lru_cache, partial
 from itertools import compress
 from pathlib import Path
 from typing import Any
 
+from ..compression.atlas import Atlas, is_compact
 from ..formats.load import load
 from ..plots.contact_sheet import captioned, tiled
 from ..reflectance.brdf import Brdf
+from ..render.bsdf import make_atlas_bsdf
 from ..render.checkpoint import Checkpoint, checkpoint_of, content, content_of
 from ..render.compare import Comparison
 from ..render.frame import Image, Scene
@@ -25,6 +27,7 @@ from ..render.metrics import exposure, flip_map, to_srgb8
 from ..render.passes import render_all
 from ..render.scene_registry import SCENES, make_scene
 from ..render.scenes import Surroundings
+from ..render.sheet import Frames, frame_number, sheets
 from ..render.viewpoint import DirectionalLight, Viewpoint
 from ..sampling import named
 from ..sampling.named import OURS
@@ -165,11 +168,15 @@ def _render(options: RenderArguments) -> dict[str, Any]:
     pairs, identity, shown = _read_all(pairs, materials, job)
     setting = _setting(job)
     identity |= {"scene": job.scene, "size": str(job.sampling.size), "sampler": job.sampler} | setting.identity
-    checkpoint = Checkpoint(
-        checkpoint_of(options.output), identity, (job.sampling.size, job.sampling.size), console.warn
-    )
+    size, together = job.sampling.size, _together(job, pairs, materials)
+    length = sheets(len(pairs), size)[0].count if together else 1
+    identity |= {"frames of a sheet": str(length)} if together else {}
+    checkpoint = Checkpoint(checkpoint_of(options.output), identity, (length * size, size), console.warn)
     started = time.perf_counter()
-    candidates, references = _rendered(job, pairs, materials, setting, checkpoint)
+    if together:
+        candidates, references = _rendered_together(job, together, setting, checkpoint), []
+    else:
+        candidates, references = _rendered(job, pairs, materials, setting, checkpoint)
     seconds = time.perf_counter() - started
     comparison = _compared(job, pairs, references, candidates) if references else None
     exposed_as = comparison.reference if comparison else _sheet(candidates)
@@ -355,6 +362,40 @@ def _rendered(
         references.append(next(rest))
         candidates.append(next(rest) if twice else references[-1])
     return candidates, references if any(compared) else []
+
+
+def _together(job: Job, pairs: Sequence[Pair], materials: Materials) -> list[Brdf]:
+    """The materials of a scene that can have them in an atlas; none if one cannot be, or is held against a reference,
+    with which it shares its directions."""
+    if not SCENES[job.scene].sheet or len(pairs) < 2 or job.sampler != OURS.name or job.asked.against:
+        return []
+    found: list[Brdf] = []
+    for pair in pairs:
+        found.append(materials.both(pair)[1])
+        if not is_compact(found[-1]):
+            return []
+    return found
+
+
+def _rendered_together(job: Job, brdfs: Sequence[Brdf], setting: Setting, checkpoint: Checkpoint) -> list[Image]:
+    """The images of materials, which are rendered as one."""
+    size, make = job.sampling.size, SCENES[job.scene].sheet
+    parts = sheets(len(brdfs), size)
+
+    @cache
+    def bsdf() -> Any:
+        return make_atlas_bsdf(Atlas(brdfs), frame_number())
+
+    def scene(part: Frames) -> Scene:
+        assert make
+        return make(bsdf(), part.first, part.count, setting.environment, view=setting.view, size=size)
+
+    with goes_on_from(checkpoint) as advance:
+        spp, seed = job.sampling.spp, job.sampling.seed
+        makers = [partial(scene, part) for part in parts]
+        images = render_all(makers, spp=spp, seed=seed, progress=advance, checkpoint=checkpoint)
+    frames = [frame for part, image in zip(parts, images, strict=True) for frame in part.cut(image)]
+    return frames[: len(brdfs)]
 
 
 def _compared(job: Job, pairs: Sequence[Pair], references: Sequence[Image], candidates: Sequence[Image]) -> Comparison:

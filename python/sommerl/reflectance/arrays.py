@@ -40,6 +40,8 @@ class NumpyOps:
         """Entry `index` of a flat buffer, the first or last for what is beyond; an integer entry as one that can be
         calculated with, and does not wrap.
         """
+        if isinstance(buffer, Section):
+            return NumpyOps.gather(buffer.whole, buffer.start + index)
         value = buffer.take(index, mode="clip")
         return value.astype(np.int64) if value.dtype.kind == "u" else value
 
@@ -47,6 +49,14 @@ class NumpyOps:
     def affine(inputs: list[Array], weights: NDArray[np.float64], bias: NDArray[np.float64]) -> list[Array]:
         """inputs · weights + bias: weights (inputs, outputs), bias (outputs)."""
         return list(np.moveaxis(np.stack(inputs, axis=-1) @ weights + bias, -1, 0))
+
+
+@dataclass(frozen=True)
+class Section:
+    """A buffer that is a part of a longer one, and begins elsewhere in each lane: at `start`. See `concatenated`."""
+
+    whole: Any
+    start: Array
 
 
 @dataclass(frozen=True)
@@ -92,6 +102,8 @@ class DrjitOps:
         return self._dr.uint32_array_t(type(x))(x)
 
     def gather(self, buffer: Any, index: Array) -> Array:
+        if isinstance(buffer, Section):
+            return self.gather(buffer.whole, buffer.start + index)
         if isinstance(buffer, Packed16):
             pair = self._dr.gather(type(buffer.pairs), buffer.pairs, index >> 1)
             return (pair >> ((index & 1) << 4)) & 0xFFFF

@@ -8,7 +8,7 @@ below the horizon.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import asdict
 from functools import cached_property
@@ -140,18 +140,8 @@ class Brdf(ABC):
         but it is finite. Raises ValueError for other shapes, and for what are not real numbers.
         """
         light, viewer = vectors("eval", wi, wo)
-        known, above = finite_and_above(light, viewer)
-        result = np.zeros(light.shape)
-        result[~known] = np.nan
-        pairs, buffers = (light[above], viewer[above]), self.buffers()
-        parts = [slice(start, start + AT_ONCE) for start in range(0, len(pairs[0]), AT_ONCE)]
-        with np.errstate(all="ignore"):
-            values = [
-                np.stack(self.f_r(split(pairs[0][part]), split(pairs[1][part]), buffers), axis=-1) for part in parts
-            ]
-        if values:
-            result[above] = finite(np.concatenate(values))
-        return result
+        buffers = self.buffers()
+        return evaluated(light, viewer, lambda wi, wo, _: self.f_r(wi, wo, buffers))
 
     def sample(self, wo: ArrayLike, u: ArrayLike) -> tuple[Vectors, Vectors, Vectors]:
         """Draws directions to the light `wi`, likelier where the BRDF reflects more.
@@ -238,6 +228,23 @@ class OnLattice(Brdf):
         other = copy(self)
         other.interpolation = self.lattice.checked(self.name, interpolation)
         return other
+
+
+def evaluated(wi: Vectors, wo: Vectors, f_r: Callable[[Triple, Triple, NDArray[np.intp]], Triple]) -> Vectors:
+    """What `Brdf.eval` gives for pairs of vectors, both of one shape (..., 3).
+
+    f_r: a formula for components of directions above the horizon; it is also told their places among all pairs.
+    """
+    known, above = finite_and_above(wi, wo)
+    result = np.zeros(wi.shape)
+    result[~known] = np.nan
+    light, viewer, places = wi[above], wo[above], np.flatnonzero(above)
+    parts = [slice(start, start + AT_ONCE) for start in range(0, len(places), AT_ONCE)]
+    with np.errstate(all="ignore"):
+        values = [np.stack(f_r(split(light[part]), split(viewer[part]), places[part]), axis=-1) for part in parts]
+    if values:
+        result[above] = finite(np.concatenate(values))
+    return result
 
 
 def vectors(caller: str, *given: ArrayLike) -> list[Vectors]:

@@ -84,7 +84,7 @@ class NodeLattice(AnyLattice):
             "base": self.base[:-1].astype(np.float64),
             "band": np.array(self.band, np.uint8),
             "row_below": _below(self.theta_h),
-            "row_place": np.array(self.theta_h, np.float64),
+            "row_place": np.array(self.theta_h, np.uint8),
             "theta_d_below": np.concatenate([_below(axis) for axis in self.theta_d]),
             "theta_d_place": _padded(self.theta_d),
             "phi_d_below": np.concatenate([_below(_whole(axis)) for axis in self.phi_d]),
@@ -203,9 +203,9 @@ def _below(axis: tuple[int, ...]) -> NDArray[np.uint8]:
     return (np.searchsorted(axis, np.arange(FINE), side="right") - 1).astype(np.uint8)
 
 
-def _padded(axes: Any) -> NDArray[np.float64]:
+def _padded(axes: Any) -> NDArray[np.uint8]:
     """The places of each band's nodes, FINE + 1 entries a band."""
-    places = np.full((len(axes), FINE + 1), float(FINE))
+    places = np.full((len(axes), FINE + 1), FINE, np.uint8)
     for row, axis in zip(places, axes, strict=True):
         row[: len(axis)] = axis
     return places.reshape(-1)

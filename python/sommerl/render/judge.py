@@ -18,6 +18,7 @@ from ..reflectance.brdf import Brdf
 from ..reflectance.distance import LOG_FLOOR
 from ..reflectance.half_diff import spherical
 from ..reflectance.metric import Metric, decibels, measured
+from ..sampling.half_vector import albedo
 from .environment import HORIZON, LIGHTS, ZENITH
 from .frame import Image
 from .metrics import exposure, psnr, to_srgb8
@@ -77,13 +78,13 @@ def score(metrics: dict[str, float]) -> float:
 
 def seen(brdf: Brdf) -> Seen:
     """Looks at a BRDF."""
-    sampler, (_, normals) = brdf.sampler, _normals(SIDE)
+    _, normals = _normals(SIDE)
     return Seen(
         _lit(brdf, normals, *_lamps()),
         _lit(brdf, normals, *_key_lamp()),
         brdf.eval(*(_cosine(PAIRS, seed) for seed in (0, 1))),
         brdf.eval(*(_grazing(GRAZING_PAIRS, seed) for seed in (2, 3))),
-        sampler.albedo(ANGLES, points=POINTS),
+        albedo(brdf, ANGLES, POINTS),
     )
 
 

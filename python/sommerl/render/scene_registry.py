@@ -14,7 +14,7 @@ from .environment import default_environment
 from .frame import Scene
 from .meshes import Mesh
 from .passes import DEFAULT_SIZE
-from .scenes import Surroundings, ball, sample, sphere, statue, still_life
+from .scenes import Surroundings, ball, sample, sphere, spheres, statue, still_life
 from .viewpoint import Viewpoint
 
 
@@ -49,6 +49,7 @@ class SceneKind:
     environment, mesh, view: whether it takes one from the user; with an environment, a directional light, too.
     each: whether it takes any number of materials and shows each in a picture of its own; `make` then makes the picture
         of one material.
+    sheet: of such a scene, makes the pictures of many materials of an atlas as a sheet, see `scenes.spheres`.
     """
 
     summary: str
@@ -58,6 +59,7 @@ class SceneKind:
     mesh: bool = False
     view: bool = False
     each: bool = False
+    sheet: Callable[..., Scene] | None = None
 
     @property
     def places(self) -> int:
@@ -122,6 +124,7 @@ SCENES: dict[str, SceneKind] = {
         NAMES,
         view=True,
         each=True,
+        sheet=spheres,
     ),
 }
 

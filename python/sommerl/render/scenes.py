@@ -18,6 +18,7 @@ from .frame import Scene
 from .llvm import mitsuba
 from .meshes import Mesh, knot, lathe
 from .passes import DEFAULT_SIZE
+from .sheet import Frames
 from .viewpoint import Camera, DirectionalLight, Point, Viewpoint
 
 FILL = 0.9  # of the frame's height, by the sphere
@@ -49,6 +50,23 @@ def sphere(
     things = {"environment": _light_of(environment), "object": {"type": "sphere", "bsdf": make_bsdf(brdf, sampler)}}
     # A sphere alone sees the environment and nothing else.
     return _scene(things, ("object",), SPHERE.seen_from(view), size=size, bounces=1)
+
+
+def spheres(
+    bsdf: Any,
+    first: int,
+    frames: int,
+    environment: Surroundings,
+    *,
+    view: Viewpoint | None = None,
+    size: int = DEFAULT_SIZE,
+) -> Scene:
+    """The pictures that `sphere` has of so many materials of an atlas from the number `first` on, as a sheet.
+
+    bsdf: from `make_atlas_bsdf`, which asks for the material that `sheet.frame_number` says. size: of a frame.
+    """
+    things = {"environment": _light_of(environment), "object": {"type": "sphere", "bsdf": bsdf}}
+    return _scene(things, ("object",), SPHERE.seen_from(view), size=size, bounces=1, frames=Frames(first, frames))
 
 
 def statue(
@@ -198,8 +216,16 @@ def _standing(
     return _scene(things, (name,), camera, size=size, bounces=BOUNCES)
 
 
-def _scene(things: Mapping[str, Any], objects: tuple[str, ...], camera: Camera, *, size: int, bounces: int) -> Scene:
-    """things: everything but camera and integrator."""
+def _scene(
+    things: Mapping[str, Any],
+    objects: tuple[str, ...],
+    camera: Camera,
+    *,
+    size: int,
+    bounces: int,
+    frames: Frames | None = None,
+) -> Scene:
+    """things: everything but camera and integrator. frames: of a sheet; None for one picture."""
     mi = mitsuba()
     film = {
         "type": "hdrfilm",
@@ -216,6 +242,9 @@ def _scene(things: Mapping[str, Any], objects: tuple[str, ...], camera: Camera, 
         "film": film,
         "sampler": {"type": "independent"},
     }
+    if frames:
+        whole = mi.load_dict(film | {"height": frames.count * size})
+        sensor = frames.sensor(mi.load_dict(sensor), whole)
     # Russian roulette would end paths by how dark the material is: the same seed would give other directions to each.
     integrator = {"type": "path", "max_depth": bounces + 1, "rr_depth": bounces + 2}
     # Each thing is made first: from one description, Mitsuba makes lamps in an order that varies from run to run, and

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compression.atlas import is_compact
 from ...compression.material import SomManBrdf
 from ...compression.palette import GainsAndShapes
 from ...reflectance.brdf import Brdf
@@ -32,6 +33,17 @@ from .language import LANGUAGES, Language
 
 A_LINE = 10  # numbers
 LONGEST_TITLE = 300
+RECORD = ("ENTRY", "SHAPE", "GAIN", "AXIS", "ROW", "KIND")  # of a material in SOMMERL_MATERIAL: where what begins
+NODE_CONSTANTS = {
+    "FINE": str(FINE),
+    "KNEE": str(KNEE),
+    "KNEE_AT": repr(KNEE / BELOW),
+    "BELOW": str(BELOW),
+    "ABOVE": str(ABOVE),
+    "STEPS_THETA": repr(FINE / HALF_PI),
+    "SMALLEST_COSINE": repr(SMALLEST_COSINE),
+    "HORIZON": repr(HORIZON),
+}
 OF_SAMPLER = ("ROWS", "COLUMNS", "ELEVATIONS", "CELLS", "SLOTS", "SLOT_BITS", "WHOLE", "TINY", "LOWEST", "SMALLEST")
 
 
@@ -66,9 +78,21 @@ def write(material: Brdf, path: str | Path) -> None:
 
     Raises FormatError for a table that is not compressed.
     """
+    _write(path, lambda language, name: source(material, language, name))
+
+
+def write_atlas(materials: Sequence[Brdf], path: str | Path) -> None:
+    """Writes compact materials as one source code, whose functions take the number of a material first.
+
+    Raises FormatError for a material that is not compact.
+    """
+    _write(path, lambda language, name: atlas_source(materials, language, name))
+
+
+def _write(path: str | Path, text: Callable[[Language, str], str]) -> None:
     path = Path(path)
     with atomic_write(path) as out:
-        out.write(source(material, LANGUAGES[path.suffix.lower()], identifier(path.stem)).encode())
+        out.write(text(LANGUAGES[path.suffix.lower()], identifier(path.stem)).encode())
 
 
 def identifier(name: str) -> str:
@@ -94,34 +118,65 @@ def source(material: Brdf, language: Language, name: str) -> str:
     """
     if not isinstance(material, SomManBrdf):
         raise FormatError(f"{material.name}: expected a compressed material, with a palette, found a {material.kind}")
-    buffers, lut = material.buffers(), material.lut
     if material.grid is None:
-        parts = _nodes(material, buffers)
+        parts = _nodes([material], numbered=False)
     else:
-        parts = _cells(material.grid, material.interpolation, buffers["index"], lut)
-    table = half_vector.HalfVectorSampler.fitted(material).table
-    arrays = [*parts.arrays, _words("SOMMERL_SAMPLER", "sampler", table.reshape(-1))]
+        parts = _cells(material.grid, material.interpolation, material.buffers()["index"], material.lut)
+    return _whole(parts, [material], comment(material.name), language, name, numbered=False)
+
+
+def atlas_source(materials: Sequence[Brdf], language: Language, name: str) -> str:
+    """The source code of compact materials. name: as in `source`.
+
+    Raises FormatError for a material that is not compact.
+    """
+    compact = [each for each in materials if isinstance(each, SomManBrdf) and is_compact(each)]
+    if len(compact) < len(materials):
+        other = next(each for each in materials if not is_compact(each))
+        raise FormatError(f"{other.name}: expected compact materials in source code of several, found another kind")
+    parts = _nodes(compact, numbered=True)
+    return _whole(parts, compact, f"{len(compact)} materials", language, name, numbered=True)
+
+
+def _whole(
+    parts: _Parts, materials: Sequence[SomManBrdf], title: str, language: Language, name: str, *, numbered: bool
+) -> str:
+    """The whole text: that of the parts, and what is the same for all kinds.
+
+    numbered: whether functions take the number of a material.
+    """
+    table = np.concatenate([half_vector.HalfVectorSampler.fitted(each).table.reshape(-1) for each in materials])
+    arrays = [*parts.arrays, _words("SOMMERL_SAMPLER", "sampler", table)]
     macros = [array.macro for array in arrays]
+    in_range = _template("in_range") if numbered else ""
     blocks = [
-        _template("head", CONTENTS=parts.contents),
+        _template("head", CONTENTS=parts.contents, MATERIALS=_template("head_several") if numbered else ""),
         _template(f"{language.name}_begin"),
         *(_guarded(array, language) for array in arrays),
         _template("entry"),
         parts.functions,
-        _template("eval", FOLD=parts.fold, LOOKUP=parts.lookup),
-        _template("sampling"),
+        _template("eval", FOLD=parts.fold, LOOKUP=parts.lookup, IN_RANGE=in_range),
+        _template("sampling", IN_RANGE=in_range),
     ]
     for_the_next_file = ("SOMMERL_FUNCTION", "SOMMERL_OUT", *macros)
     undefined = "".join(f"#undef {macro}\n" for macro in for_the_next_file)
     whole = "\n".join(blocks) + _template(f"{language.name}_end") + undefined
     values = parts.values | {constant: repr(getattr(half_vector, constant)) for constant in OF_SAMPLER}
+    cells = half_vector.ELEVATIONS * half_vector.CELLS
+    digests = [comment(each.source.sha256) or "unknown" for each in materials]
+    names = [f"//   {k}: {comment(each.name)} ({digests[k]})" for k, each in enumerate(materials)]
     values |= {
-        "TITLE": comment(material.name),
-        "SHA": comment(material.source.sha256) or "unknown",
+        "TITLE": title,
+        "SHA": "of each material, below" if numbered else digests[0],
         "NAME": name,
         "CALL": f"{name}{language.qualifier}",
         "MACROS": " and ".join((", ".join(f"{macro}(i)" for macro in macros[:-1]), f"{macros[-1]}(i)")),
         "SHARE_THETA": repr(2 / np.pi),
+        "COUNT": str(len(materials)),
+        "NAMES": "\n".join(names),
+        "OF": "uint material, " if numbered else "",
+        "ON": "material, " if numbered else "",
+        "FIRST_CELL": f"{cells}u * material + " if numbered else "",
     }
     # In one pass, so that a name with such a mark in it stays what it is.
     return re.sub(r"@([A-Z_]+)@", lambda mark: values.get(mark[1], mark[0]), whole)
@@ -139,6 +194,7 @@ def _cells(lattice: Lattice, interpolation: str, index: NDArray[Any], lut: NDArr
     """Of a lattice of cells: the LUT entry of each."""
     words, values = _packed(index)
     values |= {
+        "FIRST_ENTRY": "",
         "BINS_H": str(lattice.theta_h),
         "BINS_D": str(lattice.theta_d),
         "BINS_P": str(lattice.phi_d),
@@ -161,45 +217,109 @@ def _fold(reciprocal: bool, mirrored: bool = False) -> str:
     return _template(f"fold{'_mirrored' if mirrored else ''}{'' if reciprocal else '_not'}_reciprocal")
 
 
-def _nodes(material: SomManBrdf, buffers: Mapping[str, NDArray[Any]]) -> _Parts:
-    """Of a lattice of nodes: the two entries of each, that of the LUT in the lower bits. buffers: the material's."""
-    palette, places = material.palette, material.lattice
-    assert isinstance(palette, GainsAndShapes)
-    assert isinstance(places, NodeLattice)
-    gains, lut = palette.gains, palette.lut
-    shape_bits = max(1, (len(lut) - 1).bit_length())
-    bits = shape_bits + max(1, (len(gains) - 1).bit_length())
-    entries = buffers["index"].astype(np.uint32) | buffers["gain_index"].astype(np.uint32) << np.uint32(shape_bits)
-    words, values = _packed(entries.astype(np.uint8 if bits <= 8 else np.uint16 if bits <= 16 else np.uint32))
-    lattice = _lattice(buffers)
-    values |= {
-        "SHAPE_BITS": str(shape_bits),
-        "SHAPE_MASK": str(2**shape_bits - 1),
-        "FINE": str(FINE),
-        "FIRST_ROW": str(len(lattice) - 2 * len(buffers["base"])),
-        "KNEE": str(KNEE),
-        "KNEE_AT": repr(KNEE / BELOW),
-        "BELOW": str(BELOW),
-        "ABOVE": str(ABOVE),
-        "STEPS_THETA": repr(FINE / HALF_PI),
-        "STEPS_PHI": repr(FINE / phi_d_range(**places.folds)),
-        "SMALLEST_COSINE": repr(SMALLEST_COSINE),
-        "HORIZON": repr(HORIZON),
-        "SCALE": _numbers(buffers["scale"])[0],
-    }
-    reals = [_reals("SOMMERL_LUT", "palette", lut), _reals("SOMMERL_GAIN", "gains", gains)]
+def _nodes(materials: Sequence[SomManBrdf], *, numbered: bool) -> _Parts:
+    """Of lattices of nodes: the two entries of each, that of the LUT in the lower bits, and where the nodes are.
+
+    If numbered, each array has them one behind the other, and SOMMERL_MATERIAL says where each one begins.
+    """
+    palettes = [each.palette for each in materials if isinstance(each.palette, GainsAndShapes)]
+    places = [each.lattice for each in materials if isinstance(each.lattice, NodeLattice)]
+    buffers = [each.buffers() for each in materials]
+    lattices = [_lattice(each) for each in buffers]
+    words, values = _entries(palettes, buffers)
+    folds, fold = _kinds([tuple(lattice.folds.values()) for lattice in places])
+    roots, root = _kinds([(palette.signed, palette.smooth) for palette in palettes])
+    rows = [len(lattice) - 2 * len(each["base"]) for lattice, each in zip(lattices, buffers, strict=True)]
+    scales = np.array([palette.scale for palette in palettes])
+    arrays = [
+        words,
+        _reals("SOMMERL_LUT", "palette", np.concatenate([palette.lut for palette in palettes])),
+        _reals("SOMMERL_GAIN", "gains", np.concatenate([palette.gains for palette in palettes])),
+        _words("SOMMERL_LATTICE", "lattice", np.concatenate(lattices)),
+    ]
+    if numbered:
+        lengths = [
+            [len(each["index"]) for each in buffers],
+            [len(palette.lut) for palette in palettes],
+            [len(palette.gains) for palette in palettes],
+            [len(lattice) for lattice in lattices],
+        ]
+        starts = [np.cumsum([0, *each[:-1]]) for each in lengths]
+        records = np.stack([*starts, starts[-1] + rows, fold | root << 8], axis=-1).astype(np.uint32)
+        arrays += [
+            _words("SOMMERL_MATERIAL", "materials", records.reshape(-1)),
+            _reals("SOMMERL_SCALE", "scales", scales),
+        ]
+        values |= {f"FIRST_{part}": f"{_of_record(part)} + " for part in RECORD[: len(starts)]}
+        values |= {"FIRST_ROW": _of_record("ROW"), "SCALE": "SOMMERL_SCALE(material)"}
+    else:
+        values |= {f"FIRST_{part}": "" for part in RECORD[:4]}
+        values |= {"FIRST_ROW": f"{rows[0]}u", "SCALE": _numbers(scales)[0]}
+    phi_d = _call("phi_d", "x, y", len(folds), f"({_of_record('KIND')} & 255u)")
+    reflectance = _call("reflectance", "@ON@sum, wi, wo", len(roots), f"({_of_record('KIND')} >> 8u)")
     return _Parts(
         contents=_template("contents_nodes"),
-        arrays=[words, *reals, _words("SOMMERL_LATTICE", "lattice", lattice)],
-        functions=_template("nodes", CUBE=_template("cube_signed" if palette.signed else "cube_not_signed")),
-        fold=_fold(**places.folds),
-        lookup=_template(
-            "lookup_nodes",
-            TURN="" if places.mirrored else _template("turn"),
-            DAMPED=_template("damped_smooth" if palette.smooth else "damped"),
+        arrays=arrays,
+        functions=_template(
+            "nodes",
+            PHI_D="\n".join(_phi_d(kind, *each) for kind, each in enumerate(folds)),
+            REFLECTANCE="\n".join(_reflectance(kind, *each) for kind, each in enumerate(roots)),
         ),
-        values=values,
+        fold="",
+        lookup=_template("lookup_nodes").replace("@CALL_PHI_D@", phi_d).replace("@CALL_REFLECTANCE@", reflectance),
+        values=values | NODE_CONSTANTS,
     )
+
+
+def _entries(
+    palettes: Sequence[GainsAndShapes], buffers: Sequence[Mapping[str, NDArray[Any]]]
+) -> tuple[_Array, dict[str, str]]:
+    """The two entries of each node in as few bits as all palettes need; and the values of what reads them."""
+    shape_bits = max(1, *((len(palette.lut) - 1).bit_length() for palette in palettes))
+    bits = shape_bits + max(1, *((len(palette.gains) - 1).bit_length() for palette in palettes))
+    entries = np.concatenate(
+        [
+            each["index"].astype(np.uint32) | each["gain_index"].astype(np.uint32) << np.uint32(shape_bits)
+            for each in buffers
+        ]
+    )
+    words, values = _packed(entries.astype(np.uint8 if bits <= 8 else np.uint16 if bits <= 16 else np.uint32))
+    return words, values | {"SHAPE_BITS": str(shape_bits), "SHAPE_MASK": str(2**shape_bits - 1)}
+
+
+def _kinds(flags: Sequence[tuple[bool, ...]]) -> tuple[list[tuple[bool, ...]], NDArray[np.int64]]:
+    """The kinds that there are, and of each material the number of its kind."""
+    known = list(dict.fromkeys(flags))
+    return known, np.array([known.index(each) for each in flags])
+
+
+def _of_record(part: str) -> str:
+    """The expression for a part of a material's record."""
+    return f"SOMMERL_MATERIAL({len(RECORD)}u * material + {RECORD.index(part)}u)"
+
+
+def _call(function: str, arguments: str, kinds: int, kind: str) -> str:
+    """A call of the function of the material's kind, of so many. kind: the expression for its number."""
+    calls = [f"@NAME@_{function}_{k}({arguments})" for k in range(kinds)]
+    return "".join(f"{kind} == {k}u ? {call} : " for k, call in enumerate(calls[:-1])) + calls[-1]
+
+
+def _phi_d(kind: int, reciprocal: bool, mirrored: bool) -> str:
+    """The function for φ_d of lattices with such folds."""
+    text = _template(
+        "phi_d", FOLD=_fold(reciprocal, mirrored), TURN="" if mirrored else _template("turn")
+    )  # a mirrored axis ends
+    return text.replace("@KIND@", f"_{kind}").replace("@STEPS_PHI@", repr(FINE / phi_d_range(reciprocal, mirrored)))
+
+
+def _reflectance(kind: int, signed: bool, smooth: bool) -> str:
+    """The function for f_r of palettes that are, or are not, signed and smooth."""
+    text = _template(
+        "reflectance",
+        CUBE=_template("cube_signed" if signed else "cube_not_signed"),
+        DAMPED=_template("damped_smooth" if smooth else "damped"),
+    )
+    return text.replace("@KIND@", f"_{kind}")
 
 
 def _lattice(buffers: Mapping[str, NDArray[Any]]) -> NDArray[np.uint32]:
