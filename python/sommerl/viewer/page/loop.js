@@ -89,7 +89,7 @@ export class Loop {
     /** Follows the picture with the exposure, each time it has twice as many paths, until it has enough. */
     async expose() {
         const { count } = this.picture;
-        if (!this.exposing || count < 2 * this.exposedFor) return;
+        if (!this.exposing || count < Math.min(2 * this.exposedFor, SETTLED)) return;
         this.exposedFor = count;
         const scale = await this.picture.exposure();
         if (this.anew) return; // it is that of another picture

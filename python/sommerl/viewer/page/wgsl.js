@@ -188,11 +188,12 @@ class Translator {
         return `for (${first} ${condition}; ${then}) ${this.block()}`;
     }
 
+    /** Whatever needs parentheses is written with some. */
     inParentheses() {
         this.expect("(");
         const found = this.expression();
         this.expect(")");
-        return `(${found})`;
+        return found;
     }
 
     ended(found = this.expression()) {
