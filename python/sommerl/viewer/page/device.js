@@ -2,7 +2,7 @@
 import { WebGl } from "./gl.js";
 import { WebGpu } from "./webgpu.js";
 
-const PATIENCE = 1000; // ms, after which an adapter is not waited for any longer
+const PATIENCE = 400; // ms, after which an adapter is not waited for any longer
 
 /**
  * A device that draws on a canvas. shader: one that WebGPU has to take. wanted: "webgl", "webgpu" for waiting as long as its
