@@ -10,10 +10,16 @@ from typing import Any
 
 import pytest
 from helpers import tool
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, Playwright, sync_playwright
 
-# Pictures are drawn by the processor, the same on every machine.
+# Pictures are drawn by the processor, the same on every machine: by WebGL2, or, with more options, by WebGPU.
 OPTIONS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking")
+WEBGPU = (
+    "--enable-unsafe-webgpu",
+    "--use-webgpu-adapter=swiftshader",
+    "--enable-features=Vulkan",
+    "--use-vulkan=swiftshader",
+)
 WITHIN = ("data:", "blob:", "about:")  # what is not fetched from anywhere
 DESKTOP, PHONE = {"width": 1280, "height": 800}, {"width": 390, "height": 844}
 READY = "window.sommerl?.first > 0"  # a picture is there
@@ -46,13 +52,34 @@ def check_quiet(noise: Noise) -> None:
 
 
 @pytest.fixture(scope="session")
-def chromium() -> Iterator[Browser]:
+def playwright() -> Iterator[Playwright]:
+    """What starts browsers: there can be one in a process."""
+    with sync_playwright() as started:
+        yield started
+
+
+def _launched(playwright: Playwright, options: tuple[str, ...]) -> Iterator[Browser]:
+    browser = playwright.chromium.launch(executable_path=tool("chromium"), args=list(options))
+    yield browser
+    browser.close()
+
+
+@pytest.fixture(scope="session")
+def chromium(playwright: Playwright) -> Iterator[Browser]:
     """One browser for all tests of a process. Where there is none, they are skipped, but not in .ci/run."""
-    path = tool("chromium")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=list(OPTIONS))
+    yield from _launched(playwright, OPTIONS)
+
+
+@pytest.fixture(scope="session")
+def chromium_with_webgpu(playwright: Playwright) -> Iterator[Browser]:
+    """Another one, whose pages have WebGPU beside WebGL2."""
+    for browser in _launched(playwright, (*OPTIONS, *WEBGPU)):
+        page = browser.new_page()
+        page.goto(Path(__file__).as_uri())
+        # The first adapter takes as long as a process takes to start, and pages do not wait for long.
+        assert page.evaluate("navigator.gpu.requestAdapter().then((adapter) => adapter !== null)")
+        page.close()
         yield browser
-        browser.close()
 
 
 Browse = Callable[..., Page]
@@ -60,17 +87,20 @@ Browse = Callable[..., Page]
 
 @pytest.fixture
 def browse(chromium: Browser, tmp_path: Path) -> Iterator[Browse]:
-    """Opens a page: browse(its HTML, its file or its address, ready=…, **options of Playwright's contexts).
+    """Opens a page: browse(its HTML, its file or its address, ready=…, first=…, **options of Playwright's contexts).
 
-    ready: an expression of JavaScript that becomes true. Each page has a profile of its own. A test fails at its end if
-    one of them was not quiet.
+    ready: an expression of JavaScript that becomes true. first: a script that runs before those of the page. Each page
+    has a profile of its own. A test fails at its end if one of them was not quiet.
     """
     contexts: list[Any] = []
     noises: list[Noise] = []
 
-    def browse(shown: str | Path, *, ready: str = READY, viewport: Any = DESKTOP, **options: Any) -> Page:
+    def browse(
+        shown: str | Path, *, ready: str = READY, first: str = "", viewport: Any = DESKTOP, **options: Any
+    ) -> Page:
         context = chromium.new_context(viewport=viewport, **options)
         contexts.append(context)
+        context.add_init_script(first)
         page = context.new_page()
         page.set_default_timeout(PATIENCE)
         address = _address(shown, tmp_path, len(contexts))

@@ -12,15 +12,17 @@ INTERPOLATED = 1e-2  # the relative difference that a shader may have
 
 
 @contextmanager
-def shaders(chromium, folder, materials):
-    """Gives what the shaders of a page with these materials find, by name, for pairs of directions (float32)."""
+def shaders(chromium, folder, materials, device="webgl"):
+    """Gives what the shaders of a page with these materials find, by name, for pairs of directions (float32). device:
+    what calculates it, as the page's address has it."""
     path, names = folder / "page.html", list(materials)
     path.write_text(page([held(made, name) for name, made in materials.items()]), "utf-8")
     context, noise = chromium.new_context(), Noise()
     shown = context.new_page()
     noise.listen(shown, path.as_uri())
-    shown.goto(path.as_uri())
+    shown.goto(f"{path.as_uri()}#device={device}")
     wait_until(shown, READY)
+    assert shown.evaluate("sommerl.picture.device.kind") == {"webgl": "WebGL2", "webgpu": "WebGPU"}[device]
 
     def ask(name, pairs, what="brdf"):
         given = [names.index(name), *(w.reshape(-1).tolist() for w in pairs), what]

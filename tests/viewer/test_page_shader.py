@@ -78,6 +78,12 @@ def shaders(chromium, tmp_path_factory):
         yield ask
 
 
+@pytest.fixture(scope="module")
+def webgpu(chromium_with_webgpu, tmp_path_factory):
+    with shader_page.shaders(chromium_with_webgpu, tmp_path_factory.mktemp("page"), MATERIALS, "webgpu") as ask:
+        yield ask
+
+
 def check_nearest(found, made, pairs):
     """Pairs have the value of their cell; those at a border, which are few, that of one of those that meet there."""
     lattice, values = made.lattice, made.lattice.extended(values_of(made)).reshape(-1, 3)
@@ -108,8 +114,7 @@ def number(lattice, places):
 RANDOM64, SPECIAL64 = ([w.astype(float) for w in pairs] for pairs in (RANDOM, SPECIAL))
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_values(shaders, name):
+def check_values(shaders, name):
     made = MATERIALS[name]
     check = check_nearest if made.lookup == "nearest" else check_interpolated
     found = shaders(name, RANDOM)
@@ -118,6 +123,16 @@ def test_values(shaders, name):
     wrong[7] *= 1 + 2 * INTERPOLATED
     must_fail(check, wrong, made, RANDOM64)
     must_fail(check, np.roll(found, 1, axis=0), made, RANDOM64)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_values(shaders, name):
+    check_values(shaders, name)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_values_by_webgpu(webgpu, name):
+    check_values(webgpu, name)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -163,19 +163,13 @@ def test_pythons_meshes_are_the_pages(browse, materials):
 
 
 READ = """
-() => {
+async () => {
     const { picture, state } = sommerl;
-    const figures = picture.figures(state);
-    const { gl } = picture;
-    const read = (from, type, kind) => {
-        const found = new kind(4 * from.width * from.height);
-        gl.bindFramebuffer(gl.FRAMEBUFFER, from.framebuffer);
-        gl.readPixels(0, 0, from.width, from.height, gl.RGBA, type, found);
-        return [...found];
-    };
-    const pictures = picture.shown.map((one) => read(one, gl.UNSIGNED_BYTE, Uint8Array));
+    const read = async (one) => [...(await picture.device.pixels(one))];
+    const figures = await picture.figures(state);
+    const pictures = await Promise.all(picture.shown.map(read));
     const size = [picture.shown[0].height, picture.shown[0].width];
-    return { pictures, map: read(picture.map, gl.FLOAT, Float32Array), figures, size };
+    return { pictures, map: await read(picture.map), figures, size };
 }
 """
 
@@ -212,9 +206,10 @@ def test_what_is_saved_is_what_is_shown(browse, materials):
     wait_until(shown, "sommerl.picture.count === 16 && sommerl.picture.canvas.width > 300")
     # At once: between two calls, the page might have begun another picture.
     data, linear, shown_scale = shown.evaluate(
-        """() => {
+        """async () => {
             sommerl.picture.show(sommerl.state);
-            return [sommerl.canvas.toDataURL(), sommerl.onCanvas(), sommerl.state.scale];
+            const { scale } = sommerl.state;
+            return [sommerl.canvas.toDataURL(), await sommerl.onCanvas(), scale];
         }"""
     )
     pixels = np.array(Image.open(io.BytesIO(base64.b64decode(data.partition(",")[2]))).convert("RGB"))

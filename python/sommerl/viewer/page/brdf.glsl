@@ -3,7 +3,7 @@
 const float PI = 3.14159265358979;
 const float HALF_PI = 0.5 * PI;
 
-uniform highp sampler2D uValues; // of entries, nodes, cells or points of a grid, a pixel each
+uniform sampler2D uValues; // of entries, nodes, cells or points of a grid, a pixel each
 uniform ivec3 uBins; // of the axes
 
 // Where a pixel of a list of gl.js is.
@@ -11,7 +11,7 @@ ivec2 placeOf(int number) {
     return ivec2(number & ((1 << LIST_BITS) - 1), number >> LIST_BITS);
 }
 
-vec4 texelOf(highp sampler2D image, int number) {
+vec4 texelOf(sampler2D image, int number) {
     return texelFetch(image, placeOf(number), 0);
 }
 
@@ -64,7 +64,7 @@ vec3 halfDiff(vec3 wi, vec3 wo) {
 #endif
 
 #ifdef NODES
-uniform highp sampler2D uAxes; // see material.js
+uniform sampler2D uAxes; // see material.js
 uniform float uScale;
 const float FINE = 180.0;
 
@@ -96,7 +96,7 @@ vec3 lookup(vec3 wi, vec3 wo) {
         }
     }
 #ifndef SIGNED
-    sum = max(sum, 0.0);
+    sum = max(sum, vec3(0.0));
 #endif
 #ifdef SMOOTH
     float damped = sqrt((wi.z * wi.z + 0.0009) * (wo.z * wo.z + 0.0009));
@@ -125,7 +125,7 @@ ivec2 entriesAt(vec3 wi, vec3 wo) {
 
 #if defined(CELLS) || defined(TABLE)
 #ifdef CELLS
-uniform highp usampler2D uIndex; // the entry of each cell
+uniform usampler2D uIndex; // the entry of each cell
 
 int entryOf(ivec3 bins) {
     return int(texelFetch(uIndex, placeOf(bins.z + uBins.z * (bins.y + uBins.y * bins.x)), 0).r);
@@ -152,20 +152,19 @@ ivec3 nearest(vec3 place) {
 vec3 lookup(vec3 wi, vec3 wo) {
     vec3 place = inBins(wi, wo);
 #ifdef TRILINEAR
-    ivec3 low, high;
+    int i, j;
     vec3 share;
-    share.x = between(place.x - 0.5, uBins.x, low.x);
-    share.y = between(place.y - 0.5, uBins.y, low.y);
+    share.x = between(place.x - 0.5, uBins.x, i);
+    share.y = between(place.y - 0.5, uBins.y, j);
     float below = floor(place.z - 0.5); // φ_d turns
     share.z = place.z - 0.5 - below;
-    low.z = (int(below) + uBins.z) % uBins.z;
-    high = ivec3(min(low.xy + 1, uBins.xy - 1), (low.z + 1) % uBins.z);
+    ivec3 low = ivec3(i, j, (int(below) + uBins.z) % uBins.z);
+    ivec3 high = ivec3(min(low.xy + 1, uBins.xy - 1), (low.z + 1) % uBins.z);
     vec3 sum = vec3(0.0);
-    for (int i = 0; i < 8; i++) {
-        bvec3 upper = bvec3(i & 1, i & 2, i & 4);
-        vec3 weight = mix(1.0 - share, share, upper);
-        ivec3 at = ivec3(upper.x ? high.x : low.x, upper.y ? high.y : low.y, upper.z ? high.z : low.z);
-        sum += weight.x * weight.y * weight.z * valueOf(at);
+    for (int k = 0; k < 8; k++) {
+        ivec3 upper = ivec3(k & 1, (k >> 1) & 1, k >> 2);
+        vec3 weight = mix(1.0 - share, share, vec3(upper));
+        sum += weight.x * weight.y * weight.z * valueOf(low + upper * (high - low));
     }
     return sum;
 #else
@@ -196,7 +195,7 @@ vec3 lookup(vec3 wi, vec3 wo) {
     }
     for (int i = 0; i < 8; i++) {
         ivec3 upper = ivec3(i & 1, (i >> 1) & 1, i >> 2), at = min(low + upper, uBins - 1);
-        vec3 weight = mix(1.0 - share, share, bvec3(upper));
+        vec3 weight = mix(1.0 - share, share, vec3(upper));
         sum += weight.x * weight.y * weight.z * texelOf(uValues, at.z + uBins.z * (at.y + uBins.y * at.x)).rgb;
     }
     return sum;
@@ -204,10 +203,10 @@ vec3 lookup(vec3 wi, vec3 wo) {
 #endif
 
 #ifdef RGL
-uniform highp sampler2D uWarp; // density of visible normals, and its integral along each row: [θ_i][row][column]
-uniform highp sampler2D uRest; // θ_i, then from uStarts: integrals over rows, D, σ, and f_r cos θ_i of a viewer at the normal
+uniform sampler2D uWarp; // density of visible normals, and its integral along each row: [θ_i][row][column]
+uniform sampler2D uRest; // θ_i, then from uStarts: integrals over rows, D, σ, and f_r cos θ_i of a viewer at the normal
 uniform ivec4 uStarts;
-uniform ivec2 uShapes[4]; // width and height of the warp, of the values, of D and of σ
+uniform ivec2 uWarpSize, uValuesSize, uNdfSize, uSigmaSize; // width and height of each
 uniform int uAngles;
 const int NORMAL_POINTS = 512;
 
@@ -227,7 +226,7 @@ float segment(float t, float a, float b, int points) {
     return t * (a + 0.5 * t * (b - a)) / float(points - 1);
 }
 
-vec4 bilinear(highp sampler2D image, int start, vec2 x, ivec2 shape) {
+vec4 bilinear(sampler2D image, int start, vec2 x, ivec2 shape) {
     int i, j;
     float s = onUnit(x.x, shape.x, i), t = onUnit(x.y, shape.y, j);
     int at = start + j * shape.x + i;
@@ -236,13 +235,13 @@ vec4 bilinear(highp sampler2D image, int start, vec2 x, ivec2 shape) {
 }
 
 vec2 warp(ivec2 angles, float t, int at) {
-    int size = uShapes[0].x * uShapes[0].y;
+    int size = uWarpSize.x * uWarpSize.y;
     return mix(texelOf(uWarp, angles.x * size + at).xy, texelOf(uWarp, angles.y * size + at).xy, t);
 }
 
 // The point of the unit square that the warp takes to x.
 vec2 unwarped(vec2 x, ivec2 angles, float share) {
-    int i, j, width = uShapes[0].x, height = uShapes[0].y;
+    int i, j, width = uWarpSize.x, height = uWarpSize.y;
     float s = onUnit(x.x, width, i), t = onUnit(x.y, height, j);
     int at = j * width;
     vec2 left = mix(warp(angles, share, at + i), warp(angles, share, at + width + i), t);
@@ -271,16 +270,17 @@ vec3 lookup(vec3 light, vec3 viewer) {
     }
     float first = rest(low).x, t = high == low ? 0.0 : clamp((thetaI - first) / (rest(high).x - first), 0.0, 1.0);
     vec2 at = unwarped(x, ivec2(low, high), t);
-    int size = uShapes[1].x * uShapes[1].y;
-    vec3 f = mix(bilinear(uValues, low * size, at, uShapes[1]), bilinear(uValues, high * size, at, uShapes[1]), t).rgb;
+    int size = uValuesSize.x * uValuesSize.y;
+    vec3 f = mix(bilinear(uValues, low * size, at, uValuesSize), bilinear(uValues, high * size, at, uValuesSize), t).rgb;
 #ifdef JACOBIAN
-    float sigma = bilinear(uRest, uStarts.z, vec2(unit(thetaI), 0.5), uShapes[3]).x;
-    f *= bilinear(uRest, uStarts.y, x, uShapes[2]).x / (4.0 * max(sigma, 1e-30));
+    float sigma = bilinear(uRest, uStarts.z, vec2(unit(thetaI), 0.5), uSigmaSize).x;
+    f *= bilinear(uRest, uStarts.y, x, uNdfSize).x / (4.0 * max(sigma, 1e-30));
 #endif
     return f / max(light.z, 0.01);
 }
 #endif
 
 vec3 brdf(vec3 wi, vec3 wo) {
-    return wi.z > 0.0 && wo.z > 0.0 ? lookup(wi, wo) : vec3(0.0);
+    if (wi.z > 0.0 && wo.z > 0.0) return lookup(wi, wo);
+    return vec3(0.0);
 }

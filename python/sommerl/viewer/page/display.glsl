@@ -12,8 +12,8 @@ uniform vec2 uFiner; // pixels of the pictures for one of the canvas
 out vec4 colour;
 
 vec3 srgb(vec3 linear) {
-    vec3 x = clamp(linear, 0.0, 1.0);
-    return mix(12.92 * x, 1.055 * pow(x, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, x));
+    vec3 x = clamp(linear, vec3(0.0), vec3(1.0));
+    return mix(12.92 * x, 1.055 * pow(x, vec3(1.0 / 2.4)) - 0.055, step(vec3(0.0031308), x));
 }
 
 // A fit of the Academy's reference curves (Narkowicz 2016).
@@ -25,14 +25,14 @@ vec3 aces(vec3 x) {
 vec3 agx(vec3 x) {
     const mat3 inset = mat3(0.842479, 0.0423282, 0.0423756, 0.0784336, 0.878468, 0.0784336, 0.0792237, 0.0791661, 0.879142);
     const mat3 outset = mat3(1.19687, -0.0528968, -0.0529716, -0.0980208, 1.15190, -0.0980434, -0.0990297, -0.0989611, 1.15107);
-    x = clamp((log2(max(inset * x, 1e-10)) + 12.47393) / 16.5, 0.0, 1.0);
+    x = clamp((log2(max(inset * x, vec3(1e-10))) + 12.47393) / 16.5, vec3(0.0), vec3(1.0));
     vec3 x2 = x * x, x4 = x2 * x2;
     x = 15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x - 0.00232;
-    return pow(max(outset * x, 0.0), vec3(2.2));
+    return pow(max(outset * x, vec3(0.0)), vec3(2.2));
 }
 
 vec3 shown(vec4 radiance) {
-    vec3 x = max(radiance.rgb * uExposure, 0.0);
+    vec3 x = max(radiance.rgb * uExposure, vec3(0.0));
     if (uTone == 1) x = aces(x);
     if (uTone == 2) x = agx(x);
     return srgb(x);
@@ -65,7 +65,7 @@ void main() {
     if (uView == 4) found = difference(a, b);
     if (uView == 5) found = magma(texelFetch(uMap, at, 0).r);
     if (uView < 4) found = mix(vec3(uBehind), found, clamp(max(texelFetch(uA, at, 0).a, step(uBehind, 0.0)), 0.0, 1.0));
-    int of = uView == 0 || (uView == 2 && float(at.x) < uSplit) ? 1 : uView < 3 ? 2 : 0;
-    if (uMarks == of && of > 0 && texelFetch(uUsed, at, 0).r > 0.5) found = mix(found, vec3(1.0, 0.45, 0.1), 0.65);
+    int whose = uView == 0 || (uView == 2 && float(at.x) < uSplit) ? 1 : uView < 3 ? 2 : 0;
+    if (uMarks == whose && whose > 0 && texelFetch(uUsed, at, 0).r > 0.5) found = mix(found, vec3(1.0, 0.45, 0.1), 0.65);
     colour = vec4(found, texelFetch(uA, at, 0).a); // the material's share of the pixel, for figures
 }

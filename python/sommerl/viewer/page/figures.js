@@ -1,5 +1,4 @@
 /** How far apart two pictures are, as they are shown: PSNR and FLIP. */
-import { FULL, bind, draw, free, pixels, program, set, target } from "./gl.js";
 import { SHADERS } from "./shaders.js";
 
 const WHOLE = 128; // of 255: pixels that the material covers by half or more are its own
@@ -25,9 +24,9 @@ const OFFSETS = Array.from({ length: 21 }, (_, i) => i - 10);
 
 /** Pictures of FLIP (Andersson et al. 2020) on the GPU. */
 export class Flip {
-    constructor(gl) {
-        this.gl = gl;
-        [this.opponent, this.blur, this.flip] = ["opponent", "blur", "flip"].map((name) => program(gl, FULL, SHADERS.colour + SHADERS[name]));
+    constructor(device) {
+        this.device = device;
+        [this.opponent, this.blur, this.flip] = ["opponent", "blur", "flip"].map((name) => device.program(SHADERS.colour + SHADERS[name]));
         this.targets = [];
         const bells = WIDTHS.map((b) => OFFSETS.map((x) => Math.exp(-((Math.PI * x) ** 2) / (b * PIXELS_A_DEGREE ** 2))));
         const sums = bells.map((bell) => bell.reduce((sum, x) => sum + x));
@@ -43,54 +42,44 @@ export class Flip {
 
     /** The map of two pictures of 8 bits, a target whose first channel is FLIP from 0 to 1. It is the same one at each call. */
     of(a, b) {
-        const { gl, flip } = this;
+        const { device } = this;
         if (this.targets[0]?.width !== a.width || this.targets[0].height !== a.height) {
-            this.targets.forEach((old) => free(gl, old));
-            this.targets = Array.from({ length: 7 }, () => target(gl, a.width, a.height));
+            this.rest();
+            this.targets = Array.from({ length: 7 }, () => device.target(a.width, a.height));
         }
         const [between, rows, coloursA, featuresA, coloursB, featuresB, map] = this.targets;
         for (const [picture, colours, features] of [[a, coloursA, featuresA], [b, coloursB, featuresB]]) {
-            gl.useProgram(this.opponent);
-            bind(gl, this.opponent, { uPicture: picture.texture });
-            draw(gl, between);
+            device.draw(this.opponent, between, { uPicture: picture });
             this.filter(0, between, rows);
             this.filter(1, rows, colours);
             this.filter(2, between, rows);
             this.filter(3, rows, features);
         }
-        gl.useProgram(flip);
         const seen = { uColoursA: coloursA, uColoursB: coloursB, uFeaturesA: featuresA, uFeaturesB: featuresB };
-        bind(gl, flip, Object.fromEntries(Object.entries(seen).map(([name, one]) => [name, one.texture])));
-        set(gl, flip, { uShares: this.shares });
-        draw(gl, map);
+        device.draw(this.flip, map, { ...seen, uShares: this.shares });
         return map;
     }
 
     /** Gives memory back until it is needed again. */
     rest() {
-        this.targets.forEach((old) => free(this.gl, old));
+        this.device.free(...this.targets);
         this.targets = [];
     }
 
     filter(pick, from, into) {
-        const { gl, blur } = this;
-        gl.useProgram(blur);
-        bind(gl, blur, { uPicture: from.texture });
-        set(gl, blur, { uPick: pick, uAlong: pick % 2 ? [0, 1] : [1, 0], uWeights: this.weights[pick] });
-        draw(gl, into);
+        this.device.draw(this.blur, into, { uPicture: from, uPick: pick, uAlong: pick % 2 ? [0, 1] : [1, 0], uWeights: this.weights[pick] });
     }
+}
 
-    /** Its mean over the object's pixels. shown: the picture of 8 bits that it is of. */
-    mean(map, shown) {
-        const found = pixels(this.gl, map);
-        let [sum, count] = [0, 0];
-        for (let i = 0; i < shown.length; i += 4) {
-            if (shown[i + 3] < WHOLE) continue;
-            sum += found[i];
-            count++;
-        }
-        return sum / count;
+/** The mean of a map's pixels over the object's. shown: those of a picture of 8 bits that it is of. */
+export function meanOf(map, shown) {
+    let [sum, count] = [0, 0];
+    for (let i = 0; i < shown.length; i += 4) {
+        if (shown[i + 3] < WHOLE) continue;
+        sum += map[i];
+        count++;
     }
+    return sum / count;
 }
 
 /** Weights whose positive ones add up to 1, and whose negative ones to -1. */

@@ -8,8 +8,8 @@ vec3 hunt(vec4 opponent) {
     float y = (opponent.x + 16.0) / 116.0;
     vec3 xyz = vec3(y + opponent.y / 500.0, y, y - dot(opponent.zw, uShares) / 200.0);
     const mat3 toRgb = mat3(3.0799327, -0.9212350, 0.0528909, -1.5371500, 1.8759908, -0.2040259, -0.5427821, 0.0452442, 1.1511351);
-    xyz = TO_XYZ * clamp(toRgb * xyz, 0.0, 1.0);
-    vec3 f = mix(xyz / 0.1284186 + 4.0 / 29.0, pow(max(xyz, 1e-9), vec3(1.0 / 3.0)), step(0.0088565, xyz));
+    xyz = TO_XYZ * clamp(toRgb * xyz, vec3(0.0), vec3(1.0));
+    vec3 f = mix(xyz / 0.1284186 + 4.0 / 29.0, pow(max(xyz, vec3(1e-9)), vec3(1.0 / 3.0)), step(vec3(0.0088565), xyz));
     float lightness = 116.0 * f.y - 16.0;
     return vec3(lightness, 0.01 * lightness * vec2(500.0 * (f.x - f.y), 200.0 * (f.y - f.z)));
 }

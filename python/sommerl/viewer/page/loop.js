@@ -19,9 +19,9 @@ export class Loop {
     }
 
     next() {
-        requestAnimationFrame((now) => {
+        requestAnimationFrame(async (now) => {
             try {
-                this.step(now);
+                await this.step(now);
                 this.next();
             } catch (error) {
                 this.calls.failed(`drawing has stopped: ${error.message}`);
@@ -46,9 +46,9 @@ export class Loop {
         this.pace.moved = performance.now();
     }
 
-    step(now) {
+    async step(now) {
         const { state, picture, pace } = this;
-        if (picture.busy) return;
+        if (picture.device.busy) return;
         pace.end(now);
         if (this.fit()) this.restart(); // which has emptied the canvas: what is coarse is there soon
         const numbers = traced(state);
@@ -64,7 +64,7 @@ export class Loop {
             pace.begin(now);
             this.stale = true;
         }
-        if (this.stale && picture.count) this.show(MOST_PATHS[kind], moving); // until then, there is what was before
+        if (this.stale && picture.count) await this.show(MOST_PATHS[kind], moving); // until then, there is what was before
     }
 
     begin(numbers, bounces, resolution) {
@@ -73,13 +73,13 @@ export class Loop {
         this.calls.compared(null);
     }
 
-    show(most, moving) {
+    async show(most, moving) {
         const { state, picture } = this;
-        this.expose();
+        this.stale = false; // what changes from here on is shown the next time
+        await this.expose();
         if (!this.marked) this.mark();
-        if (!moving || state.view === "flip") this.compare(most);
+        if (!moving || state.view === "flip") await this.compare(most);
         picture.show(state);
-        this.stale = false;
         const paths = picture.count >= most ? `${most} paths a pixel` : `${picture.count} of ${most} paths a pixel`;
         this.calls.said(most > MOST_PATHS.plain ? paths : "");
         this.first ??= performance.now(); // ms from opening to a picture
@@ -87,25 +87,28 @@ export class Loop {
     }
 
     /** Follows the picture with the exposure, each time it has twice as many paths, until it has enough. */
-    expose() {
+    async expose() {
         const { count } = this.picture;
-        if (!this.exposing || count < 2 * this.exposedFor) return;
+        if (!this.exposing || count < Math.min(2 * this.exposedFor, SETTLED)) return;
         this.exposedFor = count;
-        this.state.scale = this.picture.exposure() || 1;
+        const scale = await this.picture.exposure();
+        if (this.anew) return; // it is that of another picture
+        this.state.scale = scale || 1;
         if (count < SETTLED || this.resolution < 1) return;
         this.exposing = false;
         this.calls.exposed();
     }
 
     /** Takes figures each time there are twice as many paths, and when the picture is shown otherwise. */
-    compare(most) {
+    async compare(most) {
         const { picture, state } = this;
         if (picture.films.length < 2) return;
         const how = [state.view === "flip", state.scale, state.stops, state.tone].join();
         const due = picture.count >= 2 * this.compared || (picture.count === most && this.compared < most);
         if (!due && how === this.comparedFor) return;
         [this.compared, this.comparedFor] = [picture.count, how];
-        this.calls.compared(picture.figures(state));
+        const figures = await picture.figures(state);
+        if (!this.anew) this.calls.compared(figures);
     }
 
     /** entry: {material, entry, shape, gain} as panels have it, or null. */
@@ -125,7 +128,7 @@ export class Loop {
     fit() {
         const { canvas } = this;
         const places = [canvas.clientWidth, canvas.clientHeight].map((x) => x * devicePixelRatio);
-        const share = Math.min(1, Math.sqrt(MOST_PIXELS / (places[0] * places[1])), this.picture.longest / Math.max(...places));
+        const share = Math.min(1, Math.sqrt(MOST_PIXELS / (places[0] * places[1])), this.picture.device.longest / Math.max(...places));
         const [width, height] = places.map((x) => Math.max(Math.round(x * share), 16));
         if (canvas.width === width && canvas.height === height) return false;
         [canvas.width, canvas.height] = [width, height];

@@ -2,6 +2,7 @@
 import { Background } from "./background.js";
 import { SCENES, front, surfaceAt, towards } from "./camera.js";
 import { controls } from "./controls.js";
+import { opened } from "./device.js";
 import { make } from "./dom.js";
 import { listen } from "./hand.js";
 import { Handles } from "./handles.js";
@@ -11,6 +12,7 @@ import { Loop } from "./loop.js";
 import { Panels } from "./panels.js";
 import { Picture } from "./picture.js";
 import { numbersOf, pointed } from "./pointer.js";
+import { SHADERS } from "./shaders.js";
 import { RANGES, VIEWS, command, elevations, read, traced, turned, written } from "./state.js";
 import { Store } from "./store.js";
 import { clamp } from "./vectors.js";
@@ -18,15 +20,14 @@ import { clamp } from "./vectors.js";
 const WRITTEN_AFTER = 250; // ms without a change, the address
 
 class App {
-    constructor(list) {
-        this.state = read(location.hash.slice(1), list.length);
+    constructor(list, state, background, device) {
+        Object.assign(this, { state, background });
         this.dragsLight = false;
         this.envmap = ""; // the file of the environment, if it is not the built-in one
         this.place = [null, null]; // of the pointer
         this.open = (files) => this.openAll(files);
         this.canvas = element("picture");
-        this.background = new Background();
-        this.picture = new Picture(this.canvas);
+        this.picture = new Picture(this.canvas, device);
         const arrived = () => this.arrived();
         const failed = (number, message) => this.failed(number, message);
         this.store = new Store(list, this.background, this.picture.renderer, { arrived, failed });
@@ -61,7 +62,7 @@ class App {
         new ResizeObserver(() => this.change({})).observe(this.canvas);
         matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.panels.redraw());
         addEventListener("hashchange", () => this.change(read(location.hash.slice(1), this.materials.length)));
-        this.canvas.addEventListener("webglcontextlost", () => this.complain("The graphics device was lost: reload the page."));
+        this.picture.device.lost.then(() => this.lost());
         for (const name of ["dragover", "drop"]) {
             document.addEventListener(name, (event) => {
                 event.preventDefault();
@@ -158,6 +159,16 @@ class App {
         const { psnr, flip } = figures;
         const sentence = `PSNR of this view: ${level(psnr.object)} on the object, ${level(psnr.frame)} in the frame`;
         said.textContent = sentence + (flip === null ? "" : `; mean FLIP ${flip.toFixed(4)}`);
+    }
+
+    /** The device is lost: goes on with WebGL2, unless that is what failed or something was dropped. */
+    lost() {
+        const { state, materials, envmap, picture } = this;
+        const again = picture.device.kind === "WebGPU" && !envmap && materials.every(({ data }) => data);
+        state.device = "webgl";
+        this.write();
+        if (again && location.hash.includes("device=webgl")) location.reload();
+        else this.complain("The graphics device was lost: reload the page.");
     }
 
     /** Tells the panels what is shown, and the angle of the lamp in the middle of the object. */
@@ -260,10 +271,16 @@ function element(id) {
     return document.getElementById(id);
 }
 
-try {
-    const app = new App(JSON.parse(element("materials").textContent));
+async function start() {
+    const background = new Background(); // which starts meanwhile
+    const list = JSON.parse(element("materials").textContent);
+    const state = read(location.hash.slice(1), list.length);
+    const device = await opened(element("picture"), SHADERS.display, state.device);
+    const app = new App(list, state, background, device);
     window.sommerl = Object.assign(app, hooks(app));
-} catch (error) {
+}
+
+start().catch((error) => {
     element("messages").append(make("p", {}, error.message));
     throw error;
-}
+});

@@ -1,6 +1,6 @@
 /** Decoded materials on the GPU: their textures, and what brdf.glsl has to be told of them. */
 import { FINE, cellsAbove } from "./evaluate.js";
-import { bind, list, set } from "./gl.js";
+import { list } from "./lists.js";
 
 const COLUMNS = FINE + 1; // of the texture of axes: there may be as many rows of nodes
 
@@ -12,32 +12,16 @@ export function defines(material) {
     return Object.keys(found).filter((name) => found[name]).map((name) => `#define ${name}\n`).join("");
 }
 
-/**
- * Puts a decoded material into textures: bind(program, firstUnit) sets the uniforms of a program that is in use, and takes
- * three texture units at most; free() gives the memory back. Throws an Error if the textures are too large for the device.
- */
-export function upload(gl, material) {
+/** A decoded material in {textures, uniforms}, by name. Throws an Error if the textures are too large for the device. */
+export function upload(device, material) {
     const { images, uniforms } = KINDS[material.kind](material);
-    return onGpu(gl, images, uniforms);
+    const made = Object.entries(images).map(([name, given]) => [name, list(device, ...given)]);
+    return { textures: Object.fromEntries(made), uniforms };
 }
 
-/** The same for the table of a sampler (sampler.js), which sampler.glsl reads: one texture unit. */
-export function uploadSampler(gl, table) {
-    return onGpu(gl, { uSampler: [table, 1] }, {});
-}
-
-function onGpu(gl, images, uniforms) {
-    const made = Object.entries(images).map(([name, given]) => [name, list(gl, ...given)]);
-    const textures = Object.fromEntries(made);
-    return {
-        bind(program, firstUnit = 0) {
-            bind(gl, program, textures, firstUnit);
-            set(gl, program, uniforms);
-        },
-        free() {
-            for (const one of Object.values(textures)) gl.deleteTexture(one);
-        },
-    };
+/** The textures of the table of a sampler (sampler.js), which sampler.glsl reads. */
+export function uploadSampler(device, table) {
+    return { uSampler: list(device, table, 1) };
 }
 
 /** Of each kind, by name: images, of which `list` makes textures, and uniforms. */
@@ -62,10 +46,11 @@ const KINDS = {
         const { thetaI, shapes, columns, ndf, sigma, atNormal } = material;
         const parts = [...[thetaI, columns, ndf, sigma].map((values) => fours(values, 1)), fours(atNormal, 3)];
         const starts = parts.map((sum => (part) => (sum += part.length / 4))(0));
-        const sides = ["vndf", "rgb", "ndf", "sigma"].flatMap((name) => [shapes[name][1], shapes[name][0]]);
+        const size = (name) => [shapes[name][1], shapes[name][0]];
+        const sizes = { uWarpSize: size("vndf"), uValuesSize: size("rgb"), uNdfSize: size("ndf"), uSigmaSize: size("sigma") };
         return {
             images: { uValues: [interleaved(material), 3], uWarp: [pairs(material.density, material.rows), 2], uRest: [joined(parts), 4] },
-            uniforms: { uShapes: sides, uStarts: starts.slice(0, 4), uAngles: thetaI.length },
+            uniforms: { ...sizes, uStarts: starts.slice(0, 4), uAngles: thetaI.length },
         };
     },
 };

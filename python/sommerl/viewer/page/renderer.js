@@ -1,15 +1,13 @@
 /** Pictures of a material in a scene: the mean of ever more paths. */
-import { FULL, bind, draw, free, list, program, set, target, texture } from "./gl.js";
+import { list } from "./lists.js";
 import { defines, upload, uploadSampler } from "./material.js";
 import { SHADERS } from "./shaders.js";
 import { SCENES, camera, towards } from "./camera.js";
 
-const MOST_UNITS = 3; // of textures, that a material takes
-
-/** Draws pictures with one WebGL2 context. */
+/** Draws pictures with one device (device.js). */
 export class Renderer {
-    constructor(gl) {
-        this.gl = gl;
+    constructor(device) {
+        this.device = device;
         this.programs = new Map();
         this.meshes = new Map(); // by scene
         this.environment = null; // made when it is first needed
@@ -17,43 +15,41 @@ export class Renderer {
 
     /** A decoded material on the GPU: what `trace` takes. */
     prepare(material) {
-        return { ...upload(this.gl, material), defines: defines(material), sampler: null };
+        return { ...upload(this.device, material), defines: defines(material), sampler: null };
     }
 
     /** table: of the sampler, as the worker makes it. */
     setSampler(prepared, table) {
-        prepared.sampler = uploadSampler(this.gl, table);
+        prepared.sampler = uploadSampler(this.device, table);
     }
 
     /** mesh: {boxes, triangles}. */
     setMesh(scene, mesh) {
-        const { gl } = this;
-        this.meshes.set(scene, { boxes: list(gl, mesh.boxes), triangles: list(gl, mesh.triangles), count: mesh.boxes.length / 8 });
+        const [uBoxes, uTriangles] = [mesh.boxes, mesh.triangles].map((numbers) => list(this.device, numbers));
+        this.meshes.set(scene, { uBoxes, uTriangles, uBoxCount: mesh.boxes.length / 8 });
     }
 
     /** As the worker gives it. */
     setEnvironment({ environment: { width, height, pixels }, aliases }) {
-        const { gl } = this;
-        const picture = texture(gl, { width, height, data: pixels, internal: gl.RGB32F, format: gl.RGB });
-        for (const old of Object.values(this.environment ?? {})) gl.deleteTexture(old);
-        this.environment = { picture, aliases: texture(gl, aliases) };
+        const { device } = this;
+        const uEnvironment = device.texture({ width, height, data: pixels, channels: 3 });
+        device.free(...Object.values(this.environment ?? {}));
+        this.environment = { uEnvironment, uAliases: device.texture(aliases) };
     }
 
     /** Frees what `prepare` and `setSampler` have made. */
     release(prepared) {
-        prepared.free();
-        prepared.sampler?.free();
+        this.device.free(...Object.values({ ...prepared.textures, ...prepared.sampler }));
     }
 
     /** A picture that paths are added to. */
     film(width, height) {
-        const [now, before] = [target(this.gl, width, height), target(this.gl, width, height)];
+        const [now, before] = [this.device.target(width, height), this.device.target(width, height)];
         return { now, before, width, height, count: 0, row: 0, mean: now };
     }
 
     free(film) {
-        free(this.gl, film.now);
-        free(this.gl, film.before);
+        this.device.free(film.now, film.before);
     }
 
     /** Whether there is what a view needs: a mesh, and a sampler. */
@@ -72,24 +68,12 @@ export class Renderer {
      * film.mean is what is complete. First paths go through the middle of pixels.
      */
     trace(film, prepared, view, bounces, rows = film.height) {
-        const { gl } = this;
         const made = this.programFor(prepared, view, this.isPlain(view, bounces) ? ["PLAIN"] : []);
-        gl.useProgram(made);
         if (!film.row) [film.now, film.before] = [film.before, film.now];
-        this.setView(made, film, view);
-        const jitter = film.count ? [halton(film.count, 2) - 0.5, halton(film.count, 3) - 0.5] : [0, 0];
-        set(gl, made, { uJitter: jitter, uCount: film.count, uSeed: film.count + 1, uBounces: bounces });
-        let unit = bound(gl, made, { uBefore: film.before.texture }, 0);
-        if (view.environment) {
-            unit = bound(gl, made, { uEnvironment: this.environment.picture, uAliases: this.environment.aliases }, unit);
-        }
-        unit = this.bindMesh(made, view, unit);
-        prepared.bind(made, unit);
-        prepared.sampler?.bind(made, unit + MOST_UNITS);
-        gl.enable(gl.SCISSOR_TEST);
-        gl.scissor(0, film.row, film.width, rows);
-        draw(gl, film.now);
-        gl.disable(gl.SCISSOR_TEST);
+        const uJitter = film.count ? [halton(film.count, 2) - 0.5, halton(film.count, 3) - 0.5] : [0, 0];
+        const path = { uJitter, uCount: film.count, uSeed: film.count + 1, uBounces: bounces, uBefore: film.before };
+        const values = { ...this.seen(film, prepared, view), ...path, ...this.environment, ...prepared.sampler };
+        this.device.draw(made, film.now, values, film.row, rows);
         film.row += rows;
         if (film.row >= film.height) [film.row, film.count] = [0, film.count + 1];
         film.mean = film.row && film.count ? film.before : film.now;
@@ -97,26 +81,15 @@ export class Renderer {
 
     /** Draws 1 into the pixels of a target that look up an entry with the lamp's direction. entries: [shape or entry, gain], -1 for any. */
     mark(into, prepared, view, entries) {
-        const { gl } = this;
         const made = this.programFor(prepared, { ...view, environment: false }, ["PLAIN", "ENTRIES"]);
-        gl.useProgram(made);
-        this.setView(made, into, view);
-        set(gl, made, { uJitter: [0, 0], uEntries: entries });
-        prepared.bind(made, this.bindMesh(made, view, 0));
-        draw(gl, into);
+        this.device.draw(made, into, { ...this.seen(into, prepared, view), uJitter: [0, 0], uEntries: entries });
     }
 
-    setView(made, { width, height }, view) {
-        const { eye, right, up, back } = camera(view);
-        const common = { uSize: [width, height], uCamera: [...right, ...up, ...back], uEye: eye };
-        set(this.gl, made, { ...common, uTangent: SCENES[view.scene].tangent, uLight: towards(...view.light) });
-    }
-
-    bindMesh(made, view, unit) {
-        const mesh = this.meshes.get(view.scene);
-        if (!mesh) return unit;
-        set(this.gl, made, { uBoxCount: mesh.count });
-        return bound(this.gl, made, { uBoxes: mesh.boxes, uTriangles: mesh.triangles }, unit);
+    /** What shaders have to be told of a view of a material. */
+    seen({ width, height }, prepared, view) {
+        const { eye: uEye, right: uRight, up: uUp, back: uBack } = camera(view);
+        const common = { uSize: [width, height], uEye, uRight, uUp, uBack, uTangent: SCENES[view.scene].tangent, uLight: towards(...view.light) };
+        return { ...common, ...this.meshes.get(view.scene), ...prepared.textures, ...prepared.uniforms };
     }
 
     programFor(prepared, view, more) {
@@ -125,15 +98,10 @@ export class Renderer {
         const head = prepared.defines + names.map((name) => `#define ${name}\n`).join("");
         if (!this.programs.has(head)) {
             const sampler = more.includes("PLAIN") ? "" : SHADERS.sampler;
-            this.programs.set(head, program(this.gl, FULL, head + SHADERS.brdf + sampler + SHADERS.trace));
+            this.programs.set(head, this.device.program(head + SHADERS.brdf + sampler + SHADERS.trace));
         }
         return this.programs.get(head);
     }
-}
-
-function bound(gl, made, textures, unit) {
-    bind(gl, made, textures, unit);
-    return unit + Object.keys(textures).length;
 }
 
 /** The radical inverse of a number (Halton 1960). */

@@ -1,7 +1,7 @@
 // Directions drawn as a material reflects: sampling/half_vector.py, with the same names. uSampler, from sampler.js, holds CELLS cells
 // of a unit square for each of ELEVATIONS elevations of the viewer; of a cell, from the lowest bits, its probability in units of
 // 1 / WHOLE (16 bits), another cell (8), and how many of its own SLOTS that one takes (8).
-uniform highp usampler2D uSampler;
+uniform usampler2D uSampler;
 const int ROWS = 20, COLUMNS = 8, ELEVATIONS = 12, SLOTS = 256, WHOLE = ROWS * COLUMNS * SLOTS;
 const float TINY = 1e-9, LOWEST = 1e-4, SMALLEST = 1e-35;
 

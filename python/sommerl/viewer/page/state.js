@@ -31,10 +31,13 @@ export function traced({ a, b, view }) {
     return b < 0 || view === "a" ? [a] : [a, b];
 }
 
-/** a, b: numbers of materials, -1 for none. azimuth, elevation, light: degrees. scale: of the radiance; stops: beside it. */
+/**
+ * a, b: numbers of materials, -1 for none. azimuth, elevation, light: degrees. scale: of the radiance; stops: beside it. device: "webgl"
+ * or "webgpu", what draws, or "" for the best.
+ */
 export const START = {
     a: 0, b: -1, view: "a", split: 0.5, gain: 8, scene: "sphere", azimuth: 0, elevation: 0, zoom: 1, light: [-35, 40], environment: false, scale: 0,
-    stops: 0, tone: "linear",
+    stops: 0, tone: "linear", device: "",
 };
 
 function short(x) {
@@ -47,9 +50,11 @@ export function written(state) {
         a: state.a, b: state.b, view: state.view, split: short(state.split), gain: state.gain, scene: state.scene,
         from: [state.azimuth, state.elevation, state.zoom].map(short).join(), light: state.environment ? "environment" : state.light.map(short).join(),
         lamp: state.light.map(short).join(), scale: state.scale.toPrecision(4), stops: short(state.stops), tone: state.tone,
+        device: state.device,
     };
     if (!state.environment) delete fields.lamp;
     if (!state.scale) delete fields.scale; // automatic
+    if (!state.device) delete fields.device;
     return new URLSearchParams(fields).toString().replaceAll("%2C", ",");
 }
 
@@ -81,6 +86,7 @@ export function read(text, count) {
     state.light = [within("azimuth", light[0], START.light[0]), within("light", light[1], START.light[1])];
     state.scale = number(fields.get("scale"), 1e-9, 1e9, 0);
     state.tone = one("tone", TONES.map(([name]) => name));
+    state.device = one("device", ["webgl", "webgpu"]);
     return state;
 }
 

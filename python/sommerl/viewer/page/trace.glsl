@@ -3,7 +3,7 @@
 // comes straight from the lamp. ENTRIES draws which entries pixels use instead.
 uniform vec2 uSize; // of the picture, in pixels
 uniform vec2 uJitter; // of the point in each pixel that is looked through, from its centre
-uniform mat3 uCamera; // columns: right, up, and towards the viewer
+uniform vec3 uRight, uUp, uBack; // of the camera; back is towards the viewer
 uniform vec3 uEye;
 uniform float uTangent; // of half the field of view
 uniform vec3 uLight; // towards the lamp, which gives the irradiance π
@@ -37,12 +37,8 @@ uniform sampler2D uBoxes; // of each: lowest corner, number of the box to go to 
 uniform sampler2D uTriangles; // of each: a corner, two edges, three normals
 uniform int uBoxCount;
 
-vec4 at(sampler2D list, int number) {
-    return texelOf(list, number);
-}
-
 void meetTriangle(int number, vec3 origin, vec3 direction, inout Hit hit) {
-    vec3 corner = at(uTriangles, 6 * number).xyz, a = at(uTriangles, 6 * number + 1).xyz, b = at(uTriangles, 6 * number + 2).xyz;
+    vec3 corner = texelOf(uTriangles, 6 * number).xyz, a = texelOf(uTriangles, 6 * number + 1).xyz, b = texelOf(uTriangles, 6 * number + 2).xyz;
     vec3 p = cross(direction, b);
     float volume = dot(a, p); // Möller and Trumbore 1997
     if (volume == 0.0) return;
@@ -51,15 +47,15 @@ void meetTriangle(int number, vec3 origin, vec3 direction, inout Hit hit) {
     vec3 q = cross(s, a);
     float v = dot(direction, q), far = dot(b, q);
     if (u < 0.0 || v < 0.0 || u + v > 1.0 || far <= 0.0 || far >= hit.far) return;
-    vec3 n0 = at(uTriangles, 6 * number + 3).xyz, n1 = at(uTriangles, 6 * number + 4).xyz, n2 = at(uTriangles, 6 * number + 5).xyz;
+    vec3 n0 = texelOf(uTriangles, 6 * number + 3).xyz, n1 = texelOf(uTriangles, 6 * number + 4).xyz, n2 = texelOf(uTriangles, 6 * number + 5).xyz;
     hit = Hit(far, normalize(n0 + u * (n1 - n0) + v * (n2 - n0)), cross(a, b), 1);
 }
 
 // any: whether it does not matter which surface is met first.
 void meetMesh(vec3 origin, vec3 direction, bool any, inout Hit hit) {
-    vec3 inverse = 1.0 / mix(direction, vec3(1e-12), lessThan(abs(direction), vec3(1e-12)));
+    vec3 inverse = 1.0 / mix(vec3(1e-12), direction, step(vec3(1e-12), abs(direction)));
     for (int i = 0; i < uBoxCount;) {
-        vec4 low = at(uBoxes, 2 * i), high = at(uBoxes, 2 * i + 1);
+        vec4 low = texelOf(uBoxes, 2 * i), high = texelOf(uBoxes, 2 * i + 1);
         vec3 a = (low.xyz - origin) * inverse, b = (high.xyz - origin) * inverse;
         vec3 first = min(a, b), last = max(a, b);
         float enter = max(max(first.x, first.y), max(first.z, 0.0)), leave = min(min(last.x, last.y), min(last.z, hit.far));
@@ -93,9 +89,9 @@ Hit meet(vec3 origin, vec3 direction, bool any) {
     return hit;
 }
 
-bool lit(vec3 from, vec3 direction) {
+bool lit(vec3 origin, vec3 direction) {
 #if defined(MESH) || defined(PLANE)
-    return meet(from, direction, true).what == 0;
+    return meet(origin, direction, true).what == 0;
 #else
     return true; // a sphere alone sees nothing of itself
 #endif
@@ -133,9 +129,9 @@ vec3 radianceFrom(vec3 direction) {
 vec3 towardsLight(out float pdf) {
     ivec2 size = textureSize(uAliases, 0);
     int cell = min(int(random() * float(size.x * size.y)), size.x * size.y - 1);
-    vec4 alias = texelFetch(uAliases, ivec2(cell % size.x, cell / size.x), 0);
-    if (random() >= alias.x) cell = int(alias.y);
-    vec2 place = (vec2(cell % size.x, cell / size.x) + vec2(random(), random())) / vec2(size);
+    vec4 slot = texelFetch(uAliases, ivec2(cell % size.x, cell / size.x), 0);
+    if (random() >= slot.x) cell = int(slot.y);
+    vec2 place = (vec2(ivec2(cell % size.x, cell / size.x)) + vec2(random(), random())) / vec2(size);
     float theta = place.y * PI, phi = (place.x - 0.5) * 2.0 * PI;
     float probability = texelFetch(uAliases, ivec2(cell % size.x, cell / size.x), 0).z;
     pdf = probability / (2.0 * PI * PI * max(sin(theta), 1e-6));
@@ -183,13 +179,13 @@ vec3 radiance(vec3 origin, vec3 direction, Hit hit) {
         vec3 light = towardsLight(pdf), wi = light * frame;
         if (wi.z > 0.0) {
             vec3 f = reflected(hit.what, wi, wo) * wi.z;
-            if (f != vec3(0.0) && lit(above, light)) total += weight * f * radianceFrom(light) / (pdf + densityOf(hit.what, wi, wo));
+            if (dot(abs(f), vec3(1.0)) > 0.0 && lit(above, light)) total += weight * f * radianceFrom(light) / (pdf + densityOf(hit.what, wi, wo));
         }
 #else
         vec3 wi = uLight * frame;
         if (wi.z > 0.0) {
             vec3 f = reflected(hit.what, wi, wo) * (wi.z * PI);
-            if (f != vec3(0.0) && lit(above, uLight)) total += weight * f;
+            if (dot(abs(f), vec3(1.0)) > 0.0 && lit(above, uLight)) total += weight * f;
         }
         if (depth >= uBounces) break;
 #endif
@@ -233,7 +229,7 @@ void main() {
     state = (state ^ 61u) ^ (state >> 16u);
     state = (state * 9u) ^ (state >> 4u);
     vec2 place = (2.0 * (gl_FragCoord.xy + uJitter) - uSize) / min(uSize.x, uSize.y) * uTangent;
-    vec3 direction = uCamera * normalize(vec3(place, -1.0));
+    vec3 direction = mat3(uRight, uUp, uBack) * normalize(vec3(place, -1.0));
     Hit hit = meet(uEye, direction, false);
 #ifdef ENTRIES
     mat3 frame = frameOf(hit.normal);
