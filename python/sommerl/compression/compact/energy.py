@@ -18,6 +18,8 @@ from ...sampling.half_vector import albedo
 # Of viewers, closer together where albedos change fastest
 ANGLES = np.radians((0, 10, 20, 30, 40, 50, 60, 68, 74, 78, 81, 84, 86, 87, 88, 88.5, 89, 89.3, 89.5))
 ALLOWED = 1.02  # times the source's albedo, or 1 if that is more
+# Along each side of a sampler's cell, points of the albedos' quadrature; the finer one where albedos may be too large.
+COARSE, FINE, NEAR = 6, 16, 0.85
 AIM = 0.985  # of what is allowed, since quadrature and interpolation between ANGLES are not exact
 DARK = 1e-9  # an albedo below counts as that much
 
@@ -25,24 +27,25 @@ Floats = NDArray[np.float64]
 
 
 class EnergyBound:
-    """What a material made from a source may reflect to viewers at ANGLES.
+    """What a material made from a source may reflect to viewers at ANGLES."""
 
-    points: along each side of a sampler's cell, of the albedos' quadrature.
-    """
-
-    def __init__(self, source: Brdf, points: int) -> None:
-        self._points = points
-        self._most = np.maximum(1.0, ALLOWED * albedo(source, ANGLES, points))
+    def __init__(self, source: Brdf) -> None:
+        self._most = np.maximum(1.0, ALLOWED * _albedos(source))
 
     def factors(self, brdf: Brdf) -> Floats:
         """By what f_r would have to be multiplied at each of ANGLES, at most 1."""
-        found = albedo(brdf, ANGLES, self._points)
-        within = (found <= self._most).all()
-        return (
-            np.ones(len(ANGLES))
-            if within
-            else np.minimum(1.0, AIM * (self._most / np.maximum(found, DARK)).min(axis=-1))
-        )
+        found = _albedos(brdf)
+        if (found <= self._most).all():
+            return np.ones(len(ANGLES))
+        return np.minimum(1.0, AIM * (self._most / np.maximum(found, DARK)).min(axis=-1))
+
+
+def _albedos(brdf: Brdf) -> Floats:
+    """The albedo for viewers at ANGLES, (angles, 3), exact where it is more than NEAR."""
+    found = albedo(brdf, ANGLES, COARSE)
+    near = found.max(axis=-1) > NEAR
+    found[near] = albedo(brdf, ANGLES[near], FINE)
+    return found
 
 
 def at_nodes(factors: Floats, lattice: NodeLattice) -> Floats:

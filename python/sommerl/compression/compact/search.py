@@ -140,7 +140,7 @@ class Compressor:
         self._step = step or (lambda: None)
         self._source = source_of(brdf)
         self._fitter = Fitter(brdf, seed=seed, effort=self._effort)
-        self._bound = EnergyBound(brdf, self._effort.points)
+        self._bound = EnergyBound(brdf)
         self._step()
 
     def of_size(self, size: int) -> tuple[float, SomManBrdf]:
