@@ -58,3 +58,15 @@ def test_what_may_point_up_does():
 def test_every_module_is_in_a_room():
     assert {path.name for path in PACKAGE.glob("*.py")} == {"__init__.py", "__main__.py"}
     assert {path.name for path in PACKAGE.iterdir() if path.is_dir() and path.name != "__pycache__"} == set(ROOMS)
+
+
+def check_names(paths):
+    names = [path.name for path in paths]
+    assert len(set(names)) == len(names)
+
+
+def test_names_of_test_files_are_unique():
+    """Else pytest imports one of two in the place of the other."""
+    paths = list(Path(__file__).parent.rglob("test_*.py"))
+    check_names(paths)
+    must_fail(check_names, [*paths, paths[0]])

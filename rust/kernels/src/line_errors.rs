@@ -86,26 +86,41 @@ for_each_instruction_set! {
 fn between(i: usize, j: usize, after: &Sums, before: &Sums, a: &Values, b: &Values) -> f64 {
     let (i, per_length) = (i as f64, 1.0 / (j - i) as f64);
     let mut total = [0.0; LANES];
-    for l in 0..BLOCK {
-        let w0 = before.w[0][l] - after.w[0][l];
-        let x1 = before.w[1][l] - after.w[1][l];
-        let x2 = before.w[2][l] - after.w[2][l];
+    for start in (0..BLOCK).step_by(LANES) {
+        let lane = |line: &Lines| -> [f64; LANES] { std::array::from_fn(|k| line[start + k]) };
+        let moment = |m: usize| {
+            let (x, y) = (lane(&before.w[m]), lane(&after.w[m]));
+            each(|k| x[k] - y[k])
+        };
+        let (w0, x1, x2) = (moment(0), moment(1), moment(2));
         // Moments of t, which is 0 at i and 1 at j.
-        let w1 = (x1 - i * w0) * per_length;
-        let w2 = (x2 - 2.0 * i * x1 + i * i * w0) * (per_length * per_length);
-        let (mut dots, mut aa, mut bb, mut ab) = (0.0, 0.0, 0.0, 0.0);
+        let w1 = each(|k| (x1[k] - i * w0[k]) * per_length);
+        let w2 = each(|k| (x2[k] - 2.0 * i * x1[k] + i * i * w0[k]) * (per_length * per_length));
+        let [mut dots, mut aa, mut bb, mut ab] = [[0.0; LANES]; 4];
         for c in 0..3 {
-            let s0 = before.y[0][c][l] - after.y[0][c][l];
-            let s1 = (before.y[1][c][l] - after.y[1][c][l] - i * s0) * per_length;
-            let (a, b) = (a[c][l], b[c][l]);
-            dots += (s0 - s1) * a + s1 * b;
-            aa += a * a;
-            bb += b * b;
-            ab += a * b;
+            let sum = |m: usize| {
+                let (x, y) = (lane(&before.y[m][c]), lane(&after.y[m][c]));
+                each(|k| x[k] - y[k])
+            };
+            let (s0, x1, a, b) = (sum(0), sum(1), lane(&a[c]), lane(&b[c]));
+            let s1 = each(|k| (x1[k] - i * s0[k]) * per_length);
+            dots = each(|k| dots[k] + ((s0[k] - s1[k]) * a[k] + s1[k] * b[k]));
+            aa = each(|k| aa[k] + a[k] * a[k]);
+            bb = each(|k| bb[k] + b[k] * b[k]);
+            ab = each(|k| ab[k] + a[k] * b[k]);
         }
-        let squares = (w0 - 2.0 * w1 + w2) * aa + w2 * bb + 2.0 * (w1 - w2) * ab;
-        let error = (before.squares[l] - after.squares[l]) - 2.0 * dots + squares;
-        total[l % LANES] += if error > 0.0 { error } else { 0.0 };
+        let (all, none) = (lane(&before.squares), lane(&after.squares));
+        let error = each(|k| {
+            let squares = (w0[k] - 2.0 * w1[k] + w2[k]) * aa[k] + w2[k] * bb[k] + 2.0 * (w1[k] - w2[k]) * ab[k];
+            (all[k] - none[k]) - 2.0 * dots[k] + squares
+        });
+        total = each(|k| total[k] + if error[k] > 0.0 { error[k] } else { 0.0 });
     }
     total.iter().sum()
+}
+
+/// A number for each lane.
+#[inline(always)]
+fn each(f: impl Fn(usize) -> f64) -> [f64; LANES] {
+    std::array::from_fn(f)
 }
