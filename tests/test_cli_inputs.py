@@ -227,7 +227,7 @@ def test_convert_to_a_size(capsys, tmp_path, monkeypatch):
     save(compact_material(NODES, 2, 2, name="other"), tmp_path / "in.smrl")
     for source in ("red-fabric", tmp_path / "in.smrl"):
         result = run_json(capsys, "convert", source, tmp_path / "x.smrl", "--target-size", "0.8kB")
-        assert result["options"] == {"target_size": 800, "target_psnr": None, "seed": 0}
+        assert result["options"] == {"target_size": 800, "target_psnr": None, "effort": 5, "seed": 0}
         assert result["preset"] == "compact"
         assert (result["input"], result["bytes_disk"]) == (str(source), (tmp_path / "x.smrl").stat().st_size)
         run_json(capsys, "compress", source, "-o", tmp_path / "y.smrl", "--target-size", "800")

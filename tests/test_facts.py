@@ -157,13 +157,13 @@ def check_dropped(material, report, by_hand):
 def test_bytes_of_nodes():
     """Three rows in two bands. Row 0 has 2 × 2 nodes, rows 1 and 2 have 2 × 1: 8 nodes. 2 gains, 3 shapes.
 
-    Memory: two entries of 2 bytes a node, 32; shapes, 3 · 24; gains, 2 · 8; scale, 8. The lattice: rows' first nodes
-    and places, 3 · 8 each; bands, 3; rows below, 180; for both bands and both axes, 180 bytes of nodes below and 181
-    places of 8 bytes; numbers of nodes in φ_d, 2. As the paper counts: 4 bytes a node, 24 an entry.
+    Memory: two entries of 2 bytes a node, 32; shapes, 3 · 24; gains, 2 · 8; scale, 8. The lattice: rows' first nodes,
+    3 · 8; their places and bands, 3 each; rows below, 180; for both bands and both axes, 180 bytes of nodes below and
+    181 of places; numbers of nodes in φ_d, 2. As the paper counts: 4 bytes a node, 24 an entry.
     """
     lattice = NodeLattice((0, 30, 180), (0, 1, 1), ((0, 180), (0, 180)), ((0, 90), (0,)))
     material = compact_material(lattice, 2, 3)
-    by_hand = (32 + 72 + 16 + 8) + (24 + 24 + 3 + 180 + 4 * (180 + 8 * 181) + 2)
+    by_hand = (32 + 72 + 16 + 8) + (24 + 3 + 3 + 180 + 4 * (180 + 181) + 2)
     check_bytes(material, by_hand, 4 * 8 + 24 * 5)
     must_fail(check_bytes, material, by_hand + 8, 152)
 
