@@ -134,9 +134,18 @@ def go(page: Page, fragment: str) -> None:
 def wait_until(page: Page, ready: str) -> None:
     """Waits for an expression of JavaScript to be true. (Playwright's own way needs `eval` where it has to wait.)"""
     end = time.monotonic() + PATIENCE / 1000
-    while not page.evaluate(ready):
+    while not _holds(page, ready):
         assert time.monotonic() < end, f"{ready}: not so after {PATIENCE / 1000:.0f} s"
         page.wait_for_timeout(20)
+
+
+def _holds(page: Page, ready: str) -> bool:
+    try:
+        return bool(page.evaluate(ready))
+    except Error as error:
+        if "context was destroyed" in str(error):  # the page opens itself anew, on another device
+            return False
+        raise
 
 
 def _address(shown: str | Path, folder: Path, number: int) -> str:
