@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from helpers import tool
-from playwright.sync_api import Browser, Page, Playwright, sync_playwright
+from playwright.sync_api import Browser, Error, Page, Playwright, sync_playwright
 
 # Pictures are drawn by the processor, the same on every machine: by WebGL2, or, with more options, by WebGPU.
 OPTIONS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking")
