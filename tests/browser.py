@@ -143,7 +143,7 @@ def _holds(page: Page, ready: str) -> bool:
     try:
         return bool(page.evaluate(ready))
     except Error as error:
-        if "context was destroyed" in str(error):  # the page opens itself anew, on another device
+        if "context was destroyed" in str(error):  # the page is being opened, or opens itself anew
             return False
         raise
 

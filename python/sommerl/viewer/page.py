@@ -20,7 +20,7 @@ from ..system.visible import visible
 from .bundle import module, packed, script
 from .held import REFERENCE, Held
 
-STYLES = ("style.css", "panels.css")
+STYLES = ("base.css", "style.css", "panels.css")
 
 
 def page(materials: Sequence[Held]) -> str:

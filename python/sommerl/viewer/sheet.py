@@ -19,6 +19,7 @@ import numpy as np
 from ..library.finding import QUALITY, digits, hue
 from ..library.record import Record
 from ..system.visible import visible
+from .bundle import module
 from .page import as_json, filled, policy, template, within
 
 LONGEST_TITLE = 80
@@ -65,7 +66,7 @@ def _script() -> str:
 
 @cache
 def _style() -> str:
-    return within("style", _file("sheet.css"))
+    return within("style", module("base.css") + _file("sheet.css"))
 
 
 def _file(name: str) -> str:

@@ -39,3 +39,6 @@ DEFAULT = 5
 def of(number: int) -> Effort:
     """Effort `number`, from 1 to 9."""
     return EFFORTS[number - 1]
+
+
+USUAL = of(DEFAULT)

@@ -26,8 +26,7 @@ from ...reflectance.distance import sidedness
 from ...reflectance.half_diff import directions
 from ...reflectance.nodes import ABOVE, BELOW, FINE, KNEE, SMALLEST_COSINE, NodeLattice, angles_at, damped
 from ...system.errors import MaterialError
-from . import effort as efforts
-from .effort import Effort
+from .effort import USUAL, Effort
 from .fitted_table import FittedTable
 from .quantise import Problem
 
@@ -35,8 +34,6 @@ Array = NDArray[np.float64]
 Choices = dict[int, tuple[list[int], float]]  #: for each number of nodes: their places, and the error left
 
 # The measurements below are changes of the final error of nickel (SGD) and irid_flake_paint1 (RGL) in 2,700 bytes.
-
-DEFAULT_EFFORT = efforts.of(efforts.DEFAULT)
 
 # Numbers of nodes
 SMALLEST, LARGEST = 100, 100_000  # a file holds 131,072 at most (docs/format.md)
@@ -104,7 +101,7 @@ class Fitter:
     material.
     """
 
-    def __init__(self, brdf: Brdf, *, seed: int = 0, effort: Effort = DEFAULT_EFFORT) -> None:
+    def __init__(self, brdf: Brdf, *, seed: int = 0, effort: Effort = USUAL) -> None:
         self._brdf, self._effort = brdf, effort
         self.folds = folds_of(brdf)
         self._end = FINE + self.folds["mirrored"]  # of the steps in φ_d: the last place is one of its own, or the first

@@ -21,10 +21,7 @@ from ...system.errors import MaterialError
 from ...system.optional import optional
 from ..paper.reference import EMPTY
 from ..smrl.codes import Codes, Floats, coordinates, gain_codes, gain_values, shape_codes, shape_values
-from . import effort as efforts
-from .effort import Effort
-
-DEFAULT_EFFORT = efforts.of(efforts.DEFAULT)
+from .effort import USUAL, Effort
 
 # The measurements below are changes of the final error of nickel (SGD) and irid_flake_paint1 (RGL) in 2,700 bytes.
 
@@ -125,7 +122,7 @@ def quantise(
     target: int,
     *,
     seed: int = 0,
-    effort: Effort = DEFAULT_EFFORT,
+    effort: Effort = USUAL,
     start: Start = "som",
     refine: bool = True,
 ) -> tuple[Quantised, bytes]:
