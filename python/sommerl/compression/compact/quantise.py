@@ -215,7 +215,7 @@ def _apart(
     before (Arthur & Vassilvitskii, k-means++, 2007). Values drawn by count alone crowd where nodes do, and few units
     reach the rare ones: the error of smooth materials was up to twice as large (purple-paint, 1,000 bytes).
     """
-    first = [random.random_raw() % len(values)]
+    first = [int(random.random_raw()) % len(values)]
     away = np.full(len(values), np.inf, np.float32)
     while len(first) < min(units, len(values)):
         away = np.minimum(away, ((values - values[first[-1]]) ** 2).sum(axis=1))
