@@ -219,8 +219,8 @@ def _apart(
     away = np.full(len(values), np.inf, np.float32)
     while len(first) < min(units, len(values)):
         away = np.minimum(away, ((values - values[first[-1]]) ** 2).sum(axis=1))
-        sums = np.cumsum(away * counts, dtype=np.float64)
-        place = (random.random_raw() >> 11) * 2.0**-53 * sums[-1]
+        sums: Floats = np.cumsum(away * counts, dtype=np.float64)
+        place = (int(random.random_raw()) >> 11) * 2.0**-53 * float(sums[-1])
         first.append(min(int(np.searchsorted(sums, place, side="right")), len(values) - 1))
     return values[first]
 
