@@ -84,10 +84,12 @@ class NodePalette:
         shapes: list[list[int]],
         reciprocal: bool = True,
         mirrored: bool = False,
+        prior: tuple[list[list[float]], list[float]] | None = None,
     ) -> None:
         """theta_h, band, theta_d, phi_d, reciprocal, mirrored: the fields of the `NodeLattice`; bands in order, at most
         16, and 2¹⁷ nodes. gains (G,) and shapes (S, 2): codes (`compression.smrl.codes`) in order, at most 1024 each.
-        Raises ValueError for others.
+        prior: what the model of the stream begins with, weights (3, 10) and usual errors (3,); with it, streams leave
+        out the lattice (docs/format.md, *Shared parts*). Raises ValueError for others.
         """
 
     @staticmethod
@@ -101,13 +103,25 @@ class NodePalette:
         material, with the same sentence as the other readers.
         """
 
+    def decode_part(
+        self, data: bytes, simd: str | None = None
+    ) -> tuple[NodePalette, tuple[NDArray[np.uint16], NDArray[np.uint16]]]:
+        """What a stream without a lattice holds, on this lattice and with this prior. Raises ValueError as `decode`
+        does, and if there is no prior.
+        """
+
+    def learnt(self, gain: NDArray[np.uint16], shape: NDArray[np.uint16]) -> tuple[list[list[float]], list[float]]:
+        """What the model has learnt when it has seen the material of these indices: weights (3, 10), and usual errors
+        (3,). Raises ValueError for what does not fit.
+        """
+
     def encode(self, gain: NDArray[np.uint16], shape: NDArray[np.uint16], simd: str | None = None) -> bytes:
         """The stream, of version 2, of a gain and a shape for each node, (nodes,) each. Raises ValueError for what does
         not fit, and for what would keep readers busy for too long.
         """
 
     def measure(self, gain: NDArray[np.uint16], shape: NDArray[np.uint16]) -> tuple[float, float]:
-        """The bits that the stream would take: for lattice and palette, and for the indices."""
+        """The bits that the stream would take: for what comes before the indices, and for these."""
 
     def sweep(
         self,

@@ -6,8 +6,9 @@ from helpers import lambertian_table, must_fail, random_directions
 
 from sommerl import MERL, BrdfTable, builtin
 from sommerl.compression.compact import effort as efforts
-from sommerl.compression.compact import lattice_fit as fit
-from sommerl.compression.compact.lattice_fit import Fitter, best_nodes, line_errors
+from sommerl.compression.compact import source
+from sommerl.compression.compact.lattice_choice import best_nodes, line_errors
+from sommerl.compression.compact.lattice_fit import Fitter
 from sommerl.reflectance.distance import table_metrics
 from sommerl.system.errors import MaterialError
 
@@ -84,7 +85,7 @@ def test_more_nodes_are_better(paint):
 
 def test_least_squares_are_better_than_samples(paint, monkeypatch):
     fitted = paint.fit(1500)
-    monkeypatch.setattr(fit, "RIDGE", 1e9)  # draws every node to the source's own value
+    monkeypatch.setattr(source, "RIDGE", 1e9)  # draws every node to the source's own value
     sampled = paint.fit(1500)
     assert sampled.lattice == fitted.lattice
     assert error_of(fitted) < 0.8 * error_of(sampled)
@@ -111,10 +112,10 @@ def check_measure(measure):
 
 
 def test_the_measure_of_the_fit():
-    check_measure(fit._weight)
+    check_measure(source._weight)
     for k in (0, 1):  # without a cosine
-        must_fail(check_measure, lambda x, y, z, *w, k=k: fit._weight(x, y, z, w[k], w[k]))
-    must_fail(check_measure, lambda *place: 4 * fit._weight(*place) ** 0.5)
+        must_fail(check_measure, lambda x, y, z, *w, k=k: source._weight(x, y, z, w[k], w[k]))
+    must_fail(check_measure, lambda *place: 4 * source._weight(*place) ** 0.5)
 
 
 def grid_by_hand(brdf, scale, rows, y_step, z_step):
@@ -161,16 +162,16 @@ def check_shares(errors, by_hand):
 
 def test_errors_of_bands_and_of_rows_are_of_one_scale(paint):
     """With two nodes to an axis, over the whole fine grid: shares of the error of two rows."""
-    brdf, edges = builtin("purple-paint"), paint._edges
+    brdf, choice = builtin("purple-paint"), paint._choice
     rows = of_straight_lines(*grid_by_hand(brdf, paint.scale, np.arange(181), 3, 4), 0)
     found, by_hand = [], []
     for band in (3, 5):
-        inside = np.arange(edges[band], min(edges[band + 1], 180) + 1)
+        inside = np.arange(choice._edges[band], min(choice._edges[band + 1], 180) + 1)
         values, weight = grid_by_hand(brdf, paint.scale, inside, 1, 9)
-        found.append(paint._theta_d[band][2][1] / paint._rows[2][1])
+        found.append(choice._theta_d[band][2][1] / choice._rows[2][1])
         by_hand.append(of_straight_lines(values, weight, 1) * 9 / 12 / rows)
         values, weight = grid_by_hand(brdf, paint.scale, inside, 6, 1)
-        found.append(paint._phi_d[band][2][1] / paint._rows[2][1])
+        found.append(choice._phi_d[band][2][1] / choice._rows[2][1])
         by_hand.append(of_straight_lines(values, weight, 2) * 6 / 12 / rows)
     check_shares(found, by_hand)
     must_fail(check_shares, np.array(found) * 4, by_hand)

@@ -5,7 +5,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use sommerl_codec::{
-    CompactMaterial, InstructionSet, Layout, NodeLattice, Palette, check_indices, decode, encode, measure,
+    CompactMaterial, InstructionSet, Layout, NodeLattice, Palette, Prior, check_indices, decode, decode_part, encode,
+    encode_part, learnt, measure,
 };
 use sommerl_kernels::{Values, sweep};
 
@@ -15,11 +16,19 @@ use crate::least_squares::NormalEquations;
 
 type Indices<'py> = (Bound<'py, PyArray1<u16>>, Bound<'py, PyArray1<u16>>);
 
-/// A lattice of nodes and a palette.
+/// Weights of neighbours and usual errors, for each of three coordinates.
+type Known = ([[f64; 10]; 3], [f64; 3]);
+
+/// Bounds on what a model begins with: predictions stay finite.
+const MOST_WEIGHT: f64 = 16.0;
+const MOST_LEVEL: f64 = 1024.0;
+
+/// A lattice of nodes and a palette. With a prior, streams are those of parts, which leave out the lattice.
 #[pyclass]
 pub struct NodePalette {
     lattice: NodeLattice,
     palette: Palette,
+    prior: Option<Prior>,
 }
 
 impl NodePalette {
@@ -37,7 +46,7 @@ impl NodePalette {
 #[pymethods]
 impl NodePalette {
     #[new]
-    #[pyo3(signature = (theta_h, band, theta_d, phi_d, gains, shapes, reciprocal = true, mirrored = false))]
+    #[pyo3(signature = (theta_h, band, theta_d, phi_d, gains, shapes, reciprocal = true, mirrored = false, prior = None))]
     #[allow(clippy::too_many_arguments)]
     fn new(
         theta_h: Vec<u8>,
@@ -48,12 +57,21 @@ impl NodePalette {
         shapes: Vec<[i32; 2]>,
         reciprocal: bool,
         mirrored: bool,
+        prior: Option<Known>,
     ) -> PyResult<Self> {
         guarded(|| {
             let made = NodePalette {
                 lattice: NodeLattice { theta_h, band, theta_d, phi_d, reciprocal, mirrored },
                 palette: Palette { gains, shapes },
+                prior: prior.map(|(weights, levels)| Prior { weights, levels }),
             };
+            if let Some(Prior { weights, levels }) = &made.prior {
+                let fit = weights.iter().flatten().all(|weight| weight.abs() <= MOST_WEIGHT)
+                    && levels.iter().all(|&level| level > 0.0 && level <= MOST_LEVEL);
+                if !fit {
+                    return Err(invalid("prior: expected weights up to 16, and levels above 0 and up to 1024"));
+                }
+            }
             made.lattice.check().map_err(invalid)?;
             made.palette.check().map_err(invalid)?;
             Ok(made)
@@ -80,7 +98,27 @@ impl NodePalette {
             let set = instruction_set(simd)?;
             let CompactMaterial { lattice, palette, gain, shape } =
                 py.detach(|| decode(data, layout, set)).map_err(invalid)?;
-            Ok((NodePalette { lattice, palette }, (gain.to_pyarray(py), shape.to_pyarray(py))))
+            Ok((NodePalette { lattice, palette, prior: None }, (gain.to_pyarray(py), shape.to_pyarray(py))))
+        })
+    }
+
+    /// The material in a part of a stream, on this lattice and after this prior.
+    #[pyo3(signature = (data, simd = None))]
+    fn decode_part<'py>(&self, py: Python<'py>, data: &[u8], simd: Option<&str>) -> PyResult<(Self, Indices<'py>)> {
+        guarded(|| {
+            let (set, prior) = (instruction_set(simd)?, self.prior.clone().ok_or_else(|| invalid("expected a prior"))?);
+            let CompactMaterial { lattice, palette, gain, shape } =
+                py.detach(|| decode_part(data, &self.lattice, &prior, set)).map_err(invalid)?;
+            Ok((NodePalette { lattice, palette, prior: Some(prior) }, (gain.to_pyarray(py), shape.to_pyarray(py))))
+        })
+    }
+
+    /// What a model has learnt from a material.
+    fn learnt(&self, gain: PyReadonlyArray1<u16>, shape: PyReadonlyArray1<u16>) -> PyResult<Known> {
+        guarded(|| {
+            let Prior { weights, levels } =
+                learnt(&self.material(&gain, &shape)?, self.prior.as_ref()).map_err(invalid)?;
+            Ok((weights, levels))
         })
     }
 
@@ -94,14 +132,19 @@ impl NodePalette {
     ) -> PyResult<Bound<'py, PyBytes>> {
         guarded(|| {
             let (material, set) = (self.material(&gain, &shape)?, instruction_set(simd)?);
-            let stream = py.detach(|| encode(&material, set)).map_err(invalid)?;
+            let stream = py.detach(|| match &self.prior {
+                Some(prior) => encode_part(&material, prior, set),
+                None => encode(&material, set),
+            });
+            let stream = stream.map_err(invalid)?;
             Ok(PyBytes::new(py, &stream))
         })
     }
 
     /// Bits of lattice and palette, and of the indices.
     fn measure(&self, gain: PyReadonlyArray1<u16>, shape: PyReadonlyArray1<u16>) -> PyResult<(f64, f64)> {
-        guarded(|| measure(&self.material(&gain, &shape)?, InstructionSet::fastest()).map_err(invalid))
+        let set = InstructionSet::fastest();
+        guarded(|| measure(&self.material(&gain, &shape)?, self.prior.as_ref(), set).map_err(invalid))
     }
 
     #[allow(clippy::too_many_arguments)]
@@ -132,7 +175,9 @@ impl NodePalette {
                 return Err(invalid("expected finite numbers, found others"));
             }
             let values = Values { gains, shapes };
-            Ok(py.detach(|| sweep(&self.lattice, &self.palette, &values, equations, gain, shape, price)))
+            Ok(py.detach(|| {
+                sweep(&self.lattice, &self.palette, self.prior.as_ref(), &values, equations, gain, shape, price)
+            }))
         })
     }
 

@@ -36,8 +36,8 @@ mod tests;
 
 pub use error::Error;
 pub use lattice::{FINE, NodeLattice};
-pub use model::Model;
+pub use model::{Model, Prior};
 pub use palette::Palette;
 pub use range_coder::{Weights, bits_of};
 pub use sommerl_simd::InstructionSet;
-pub use stream::{CompactMaterial, Layout, check_indices, decode, encode, measure};
+pub use stream::{CompactMaterial, Layout, check_indices, decode, decode_part, encode, encode_part, learnt, measure};

@@ -5,12 +5,21 @@
 use crate::entries::{Entries, Expected};
 use crate::lattice::{FINE, NodeLattice};
 use crate::palette::Palette;
-use crate::predictor::Predictor;
+use crate::predictor::{Predictor, Row};
 use crate::range_coder::Weights;
 
 /// A node's coordinates: octaves of the gain, and the two of the shape.
 const CHANNELS: usize = 3;
 type Node = [f64; CHANNELS];
+
+/// What the predictors of the three coordinates begin with, instead of knowing nothing: what they learnt from other materials.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prior {
+    /// The weights of a node's neighbours.
+    pub weights: [Row; CHANNELS],
+    /// The usual errors, above 0.
+    pub levels: Node,
+}
 
 /// The nodes of a row, or a row's nodes moved to the places of another band.
 #[derive(Default)]
@@ -35,12 +44,17 @@ pub struct Model<'a> {
 
 impl<'a> Model<'a> {
     /// Before the first row.
-    pub fn new(lattice: &'a NodeLattice, palette: &Palette) -> Self {
+    pub fn new(lattice: &'a NodeLattice, palette: &Palette, prior: Option<&Prior>) -> Self {
         let [gains, first, second] = palette.places();
         let flat = vec![0.0; gains.len()];
+        let places = [&gains, &first, &second];
+        let predictors = std::array::from_fn(|c| match prior {
+            Some(known) => Predictor::after(places[c], known.weights[c], known.levels[c]),
+            None => Predictor::new(places[c]),
+        });
         Model {
             lattice,
-            predictors: [&gains, &first, &second].map(|places| Predictor::new(places)),
+            predictors,
             gains: Entries::new([gains, flat]),
             shapes: Entries::new([first, second]),
             row: 0,
@@ -153,6 +167,12 @@ impl<'a> Model<'a> {
     #[inline(always)]
     pub fn reached(&self) -> usize {
         self.gains.reached + self.shapes.reached
+    }
+
+    /// What the predictors have learnt so far.
+    pub fn learnt(&self) -> Prior {
+        let learnt = self.predictors.each_ref().map(Predictor::learnt);
+        Prior { weights: learnt.map(|(weights, _)| weights), levels: learnt.map(|(_, level)| level) }
     }
 
     /// Gains have one coordinate: the second is 0 and is given no weight.

@@ -10,6 +10,9 @@ const FIRST: Row = [0.5, 0.5, 0.0, 0.0, -0.5, -0.5, 0.0, 0.0, 0.0, 0.0];
 /// 1 / the factor by which earlier nodes lose their influence with each new one.
 const FORGET: f64 = 1.0005;
 
+/// How much less is open of weights that are known beforehand than of `FIRST`.
+const KNOWN: f64 = 0.1;
+
 /// The predictor, and its prediction for the present node.
 pub struct Predictor {
     weights: Row,
@@ -35,6 +38,18 @@ impl Predictor {
         }
         let level = 0.15 * variance.sqrt();
         Predictor { weights: FIRST, inverse, level, neighbours: [0.0; NEIGHBOURS], predicted: 0.0, scale: level }
+    }
+
+    /// One that begins with weights and a mean error that others have learnt.
+    pub fn after(values: &[f64], weights: Row, level: f64) -> Self {
+        let mut made = Predictor { weights, level, scale: level, ..Predictor::new(values) };
+        made.inverse.iter_mut().flatten().for_each(|x| *x *= KNOWN);
+        made
+    }
+
+    /// The weights of the neighbours, and the running mean of the errors.
+    pub fn learnt(&self) -> (Row, f64) {
+        (self.weights, self.level)
     }
 
     /// Predicts a node. up: the value above it, which is subtracted from the neighbours' values. errors: of the predictions of

@@ -5,7 +5,7 @@ use sommerl_simd::{InstructionSet, for_each_instruction_set};
 
 use crate::error::Error;
 use crate::lattice::{FINE, MOST_BANDS, MOST_NODES, NodeLattice};
-use crate::model::Model;
+use crate::model::{Model, Prior};
 use crate::palette::{HIGHEST_GAIN, MOST_ENTRIES, Palette, WIDEST_SHAPE};
 use crate::range_coder::{BitCounter, Coder, Context, Decoder, Encoder, FRESH};
 
@@ -89,7 +89,7 @@ pub(crate) fn encode_as(layout: Layout, material: &CompactMaterial, set: Instruc
     let lattice = lattice(&mut coder, layout, Some(&material.lattice))?;
     let palette = palette(&mut coder, layout, Some(&material.palette))?;
     let (mut gain, mut shape) = (material.gain.clone(), material.shape.clone());
-    let reached = indices(set, &mut coder, &lattice, &palette, &mut gain, &mut shape, MOST_REACHED)?;
+    let reached = indices(set, &mut coder, &lattice, &palette, None, &mut gain, &mut shape, MOST_REACHED)?;
     let stream = coder.finish();
     within_reach(reached, most_reached(stream.len()))?;
     Ok(stream)
@@ -102,24 +102,75 @@ pub fn decode(data: &[u8], layout: Layout, set: InstructionSet) -> Result<Compac
     let lattice = lattice(&mut coder, layout, None)?;
     let palette = palette(&mut coder, layout, None)?;
     let (mut gain, mut shape) = (vec![0; lattice.nodes()], vec![0; lattice.nodes()]);
-    indices(set, &mut coder, &lattice, &palette, &mut gain, &mut shape, most_reached(data.len()))?;
+    indices(set, &mut coder, &lattice, &palette, None, &mut gain, &mut shape, most_reached(data.len()))?;
     if !coder.is_the_encoders() {
         return Err(Error::OtherStream);
     }
     Ok(CompactMaterial { lattice, palette, gain, shape })
 }
 
-/// How many bits the stream of a material takes: for lattice and palette, and for the indices. Gives the errors of `encode` for
-/// what is no material of this format.
-pub fn measure(material: &CompactMaterial, set: InstructionSet) -> Result<(f64, f64), Error> {
+/// The part of a material's stream that is its own where its lattice is shared and the model begins with a prior: the palette and
+/// the indices. Gives the errors of `encode`.
+pub fn encode_part(material: &CompactMaterial, prior: &Prior, set: InstructionSet) -> Result<Vec<u8>, Error> {
+    material.check()?;
+    let mut coder = Encoder::new();
+    let palette = palette(&mut coder, Layout::of(&material.lattice), Some(&material.palette))?;
+    let (mut gain, mut shape) = (material.gain.clone(), material.shape.clone());
+    let reached =
+        indices(set, &mut coder, &material.lattice, &palette, Some(prior), &mut gain, &mut shape, MOST_REACHED)?;
+    let stream = coder.finish();
+    within_reach(reached, most_reached(stream.len()))?;
+    Ok(stream)
+}
+
+/// The material of such a part, on the lattice that is shared, which has to be valid. Gives an error for every part that is not the
+/// only one of a material, and neither panics nor takes long for any bytes.
+pub fn decode_part(
+    data: &[u8],
+    lattice: &NodeLattice,
+    prior: &Prior,
+    set: InstructionSet,
+) -> Result<CompactMaterial, Error> {
+    lattice.check()?;
+    let mut coder = Decoder::new(data);
+    let palette = palette(&mut coder, Layout::of(lattice), None)?;
+    let (mut gain, mut shape) = (vec![0; lattice.nodes()], vec![0; lattice.nodes()]);
+    indices(set, &mut coder, lattice, &palette, Some(prior), &mut gain, &mut shape, most_reached(data.len()))?;
+    if !coder.is_the_encoders() {
+        return Err(Error::OtherStream);
+    }
+    Ok(CompactMaterial { lattice: lattice.clone(), palette, gain, shape })
+}
+
+/// How many bits the stream of a material takes: for lattice and palette, and for the indices; with a prior, those of its part. Gives
+/// the errors of `encode` for what is no material of this format.
+pub fn measure(material: &CompactMaterial, prior: Option<&Prior>, set: InstructionSet) -> Result<(f64, f64), Error> {
     material.check()?;
     let (mut coder, layout) = (BitCounter(0.0), Layout::of(&material.lattice));
-    let lattice = lattice(&mut coder, layout, Some(&material.lattice))?;
+    if prior.is_none() {
+        lattice(&mut coder, layout, Some(&material.lattice))?;
+    }
     let palette = palette(&mut coder, layout, Some(&material.palette))?;
     let head = coder.0;
     let (mut gain, mut shape) = (material.gain.clone(), material.shape.clone());
-    indices(set, &mut coder, &lattice, &palette, &mut gain, &mut shape, usize::MAX)?;
+    indices(set, &mut coder, &material.lattice, &palette, prior, &mut gain, &mut shape, usize::MAX)?;
     Ok((head, coder.0 - head))
+}
+
+/// What the model has learnt when it has seen a whole material. Gives the errors of `encode`.
+pub fn learnt(material: &CompactMaterial, prior: Option<&Prior>) -> Result<Prior, Error> {
+    material.check()?;
+    let CompactMaterial { lattice, palette, gain, shape } = material;
+    let (mut model, mut first) = (Model::new(lattice, palette, prior), 0);
+    for row in 0..lattice.band.len() {
+        model.begin(row);
+        for at in 0..lattice.nodes_in(row) {
+            model.expect(at / lattice.width(row), at % lattice.width(row));
+            model.update(at, gain[first + at].into(), shape[first + at].into());
+        }
+        first += lattice.nodes_in(row);
+    }
+    Ok(model.learnt())
 }
 
 /// The bound on entries within reach for a stream of so many bytes: a few bytes cannot keep a decoder busy for long.
@@ -136,15 +187,17 @@ fn within_reach(reached: usize, most: usize) -> Result<(), Error> {
 for_each_instruction_set! { up to avx2:
     /// Writes or reads each node's gain and shape. Returns the number of entries within reach, of both palettes and added up over
     /// all nodes.
+    #[allow(clippy::too_many_arguments)] // each is one of the model's or of the stream's own
     fn indices<C: Coder>(
         coder: &mut C,
         lattice: &NodeLattice,
         palette: &Palette,
+        prior: Option<&Prior>,
         gain: &mut [u16],
         shape: &mut [u16],
         most_reached: usize,
     ) -> Result<usize, Error> {
-        let mut model = Model::new(lattice, palette);
+        let mut model = Model::new(lattice, palette, prior);
         let mut first = 0;
         for row in 0..lattice.band.len() {
             model.begin(row);

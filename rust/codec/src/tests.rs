@@ -224,7 +224,7 @@ fn refusal(change: impl Fn(&mut CompactMaterial)) -> Option<Error> {
     let mut material = small();
     change(&mut material);
     let error = encode(&material, SET).err();
-    assert_eq!(measure(&material, SET).err(), error);
+    assert_eq!(measure(&material, None, SET).err(), error);
     error
 }
 

@@ -1,7 +1,7 @@
 //! Chooses the gain and the shape of each node, one node after the other: those that cost the least in error and bits, given
 //! what the other nodes have at that time.
 
-use sommerl_codec::{Model, NodeLattice, Palette, Weights, bits_of};
+use sommerl_codec::{Model, NodeLattice, Palette, Prior, Weights, bits_of};
 
 use crate::least_squares::Normal;
 
@@ -16,12 +16,14 @@ pub struct Values<'a> {
 /// How often gain and shape are chosen in turn. More changes nothing.
 const TURNS: usize = 3;
 
-/// One sweep over all nodes in the order of the stream. Returns the bits of the indices. equations: half the error of values z is
+/// One sweep over all nodes in the order of the stream. Returns the bits of the indices. prior: what the model begins with. equations: half the error of values z is
 /// zᵀHz/2 − bᵀz for each channel. price: the error that a bit is worth; if
 /// None, no node changes. Panics if sizes do not fit.
+#[allow(clippy::too_many_arguments)] // what is swept, by what, towards what
 pub fn sweep(
     lattice: &NodeLattice,
     palette: &Palette,
+    prior: Option<&Prior>,
     values: &Values,
     equations: &Normal,
     gain: &mut [u16],
@@ -31,7 +33,7 @@ pub fn sweep(
     let Values { gains, shapes } = *values;
     let value = |g: u16, s: u16| shapes[s as usize].map(|x| gains[g as usize] * x);
     let mut z: Vec<[f64; 3]> = gain.iter().zip(shape.iter()).map(|(&g, &s)| value(g, s)).collect();
-    let mut model = Model::new(lattice, palette);
+    let mut model = Model::new(lattice, palette, prior);
     let (mut gain_bits, mut shape_bits) = (vec![0.0; gains.len()], vec![0.0; shapes.len()]);
     let (mut i, mut bits) = (0, 0.0);
     for row in 0..lattice.band.len() {

@@ -48,6 +48,7 @@ RIDGE = 1e-3  # of an entry's curvature: keeps its value where its nodes leave i
 LEAST_RIDGE = 1e-8  # of the largest curvature: so that entries whose nodes have no weight can be solved for
 
 Start = Literal["som", "k-means"]
+Prior = tuple[list[list[float]], list[float]]  #: as `_core.NodePalette` takes it
 
 
 @dataclass(frozen=True)
@@ -55,13 +56,14 @@ class Problem:
     """The error of values z at a lattice's nodes, zᵀ H z − 2 bᵀ z + constant for each channel, and its minimum.
 
     equations: H z = b. best: the values z of least error, (nodes, 3). error: the error of `best`, summed over the
-    channels.
+    channels. prior: what the model of the stream begins with, if streams are to leave out the lattice.
     """
 
     lattice: NodeLattice
     equations: _core.NormalEquations
     best: Floats
     error: float
+    prior: Prior | None = None
 
     def scaled(self, factors: Floats) -> Problem:
         """The problem whose values of least error are these times a factor for each node, (nodes)."""
@@ -87,17 +89,18 @@ class Quantised:
         """The values of the nodes, gain · shape, (nodes, 3)."""
         return gain_values(self.gains)[self.gain_index][:, None] * shape_values(self.shapes)[self.shape_index]
 
-    def palette(self, lattice: NodeLattice) -> Any:
+    def palette(self, lattice: NodeLattice, prior: Prior | None = None) -> _core.NodePalette:
         """The core's object for these palettes on a lattice, which measures and writes streams."""
-        return _core.NodePalette(*lattice.axes(), self.gains.tolist(), self.shapes.tolist(), **lattice.folds)
+        codes = self.gains.tolist(), self.shapes.tolist()
+        return _core.NodePalette(*lattice.axes(), *codes, **lattice.folds, prior=prior)
 
-    def stream(self, lattice: NodeLattice) -> bytes:
+    def stream(self, lattice: NodeLattice, prior: Prior | None = None) -> bytes:
         """The stream of a file. The entries have to be `ordered`.
 
         Raises MaterialError if it would take readers too long (docs/format.md, *A reader's work*).
         """
         try:
-            return self.palette(lattice).encode(self.gain_index, self.shape_index)
+            return self.palette(lattice, prior).encode(self.gain_index, self.shape_index)
         except ValueError as error:
             raise MaterialError(str(error)) from error
 
@@ -142,9 +145,12 @@ def quantise(
         quantised = _swept(problem, quantised.ordered(), price)
         ordered = quantised.ordered()
         if turn < effort.turns:
-            size = sum(ordered.palette(problem.lattice).measure(ordered.gain_index, ordered.shape_index)) / 8
+            size = (
+                sum(ordered.palette(problem.lattice, problem.prior).measure(ordered.gain_index, ordered.shape_index))
+                / 8
+            )
         else:
-            stream = ordered.stream(problem.lattice)
+            stream = ordered.stream(problem.lattice, problem.prior)
             size = len(stream)
             found.append((problem.excess(ordered.values()), ordered, stream))
         if turn:
@@ -249,7 +255,7 @@ def _swept(problem: Problem, quantised: Quantised, price: float) -> Quantised:
     """One pass over all nodes, each of which takes the entries with the least error plus price · bits."""
     gain_index, shape_index = quantised.gain_index.copy(), quantised.shape_index.copy()
     values = gain_values(quantised.gains), shape_values(quantised.shapes)
-    quantised.palette(problem.lattice).sweep(gain_index, shape_index, *values, problem.equations, price)
+    quantised.palette(problem.lattice, problem.prior).sweep(gain_index, shape_index, *values, problem.equations, price)
     return Quantised(quantised.gains, gain_index, quantised.shapes, shape_index)
 
 

@@ -24,7 +24,8 @@ from ..smrl import file
 from ..smrl.codes import gain_values, shape_values
 from . import effort as efforts
 from .energy import EnergyBound, at_nodes
-from .lattice_fit import LARGEST, SMALLEST, Fitter
+from .lattice_choice import LARGEST, SMALLEST
+from .lattice_fit import Fitter
 from .quantise import Problem, Quantised, quantise
 
 Quality = Callable[[SomManBrdf], float]  #: of a candidate, in decibels

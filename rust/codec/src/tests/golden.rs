@@ -92,7 +92,7 @@ fn what_is_written_are_the_golden_bytes() {
         let mut material = read(stream, layout).unwrap();
         assert!(gives(&material, stream, layout));
         if layout != Layout::First {
-            let (head, indices) = measure(&material, InstructionSet::fastest()).unwrap();
+            let (head, indices) = measure(&material, None, InstructionSet::fastest()).unwrap();
             assert!((head + indices - 8.0 * stream.len() as f64).abs() < 32.0);
         }
         material.gain[40] ^= 1;
