@@ -21,10 +21,7 @@ def pack(library: Library, path: str | Path, *, progress: Callable[[int, int], N
     cannot be written.
     """
     path = Path(path)
-    if path.suffix.lower() != EXTENSION:
-        raise OptionError(f"{path}: expected a name that ends in {EXTENSION}, found {path.suffix!r}")
-    if not library:
-        raise MaterialError(f"{library.path}: expected materials in it, found none")
+    check_packed(library, path)
     done = 0
 
     def read(name: str) -> bytes:
@@ -36,3 +33,11 @@ def pack(library: Library, path: str | Path, *, progress: Callable[[int, int], N
 
     with atomic_write(path) as out:
         return library_file.write(out, [entry_of(record) for record in library.records], read)
+
+
+def check_packed(library: Library, path: Path) -> None:
+    """Raises MaterialError for an empty library, and OptionError for a name that does not end in .smrlib."""
+    if path.suffix.lower() != EXTENSION:
+        raise OptionError(f"{path}: expected a name that ends in {EXTENSION}, found {path.suffix!r}")
+    if not library:
+        raise MaterialError(f"{library.path}: expected materials in it, found none")

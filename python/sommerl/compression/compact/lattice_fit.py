@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...reflectance.brdf import Brdf
+from ...system.errors import MaterialError
+from ..smrl.shared import Shared
 from .effort import USUAL, Effort
 from .fitted_table import FittedTable
 from .lattice_choice import LatticeChoice
@@ -47,3 +51,29 @@ class Fitter:
         """The least-squares problem on such a lattice, with its solution. Raises MaterialError if `nodes` is not from
         SMALLEST to LARGEST."""
         return self._source.problem(self._choice.lattice(nodes))
+
+
+class SharedFitter:
+    """Fits the shared lattices of a library's file to a material: the one of the least error is taken.
+
+    scale: as of `Fitter`. Raises MaterialError for a black material, and for one that no shared lattice can hold, since
+    they fold φ_d as it does not allow.
+    """
+
+    def __init__(self, brdf: Brdf, shared: Shared, *, seed: int = 0, effort: Effort = USUAL) -> None:
+        allowed = folds_of(brdf)
+        fitting = [each for each in shared.lattices if all(allowed[name] or not on for name, on in each.folds.items())]
+        if not fitting:
+            raise MaterialError(f"{brdf.name}: none of the shared lattices can hold it, since they fold φ_d")
+        found: list[tuple[Problem, float]] = []
+        for lattice in fitting:
+            # All have the same directions, as far as they fold φ_d alike.
+            source = FittedSource(brdf, lattice.folds, np.random.Generator(np.random.PCG64(seed)))
+            source.prepare(effort.directions)
+            found.append((source.problem(lattice), source.scale))
+        problem, self.scale = min(found, key=lambda each: each[0].error)
+        self._problem = replace(problem, prior=shared.prior)
+
+    def problem(self, _: int) -> Problem:
+        """The least-squares problem on that lattice, with its solution, whatever the number of nodes asked for."""
+        return self._problem

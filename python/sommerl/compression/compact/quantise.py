@@ -21,6 +21,7 @@ from ...system.errors import MaterialError
 from ...system.optional import optional
 from ..paper.reference import EMPTY
 from ..smrl.codes import Codes, Floats, coordinates, gain_codes, gain_values, shape_codes, shape_values
+from ..smrl.node_parts import Prior
 from .effort import USUAL, Effort
 
 # The measurements below are changes of the final error of nickel (SGD) and irid_flake_paint1 (RGL) in 2,700 bytes.
@@ -48,7 +49,6 @@ RIDGE = 1e-3  # of an entry's curvature: keeps its value where its nodes leave i
 LEAST_RIDGE = 1e-8  # of the largest curvature: so that entries whose nodes have no weight can be solved for
 
 Start = Literal["som", "k-means"]
-Prior = tuple[list[list[float]], list[float]]  #: as `_core.NodePalette` takes it
 
 
 @dataclass(frozen=True)

@@ -22,10 +22,11 @@ from ..material import SomManBrdf
 from ..palette import GainsAndShapes
 from ..smrl import file
 from ..smrl.codes import gain_values, shape_values
+from ..smrl.shared import PART, Shared
 from . import effort as efforts
 from .energy import EnergyBound, at_nodes
 from .lattice_choice import LARGEST, SMALLEST
-from .lattice_fit import Fitter
+from .lattice_fit import Fitter, SharedFitter
 from .quantise import Problem, Quantised, quantise
 
 Quality = Callable[[SomManBrdf], float]  #: of a candidate, in decibels
@@ -124,6 +125,7 @@ class Compressor:
 
     quality: gives a candidate's quality [dB]; if None, minus the least-squares error is used.
     step: called after the preparation and after each candidate.
+    shared: lattices; sizes are then those of parts (`smrl.shared`), without what is shared.
     """
 
     def __init__(
@@ -134,13 +136,20 @@ class Compressor:
         seed: int = 0,
         quality: Quality | None = None,
         step: Callable[[], None] | None = None,
+        shared: Shared | None = None,
     ) -> None:
         self.tried: list[tuple[int, int, float]] = []
         self._brdf, self._seed, self._quality = brdf, seed, quality
         self._effort = efforts.of(effort)
         self._step = step or (lambda: None)
         self._source = source_of(brdf)
-        self._fitter = Fitter(brdf, seed=seed, effort=self._effort)
+        self._fitter: Fitter | SharedFitter
+        if shared is None:
+            self._fitter = Fitter(brdf, seed=seed, effort=self._effort)
+            self._head = file.head_bytes(brdf.name, self._source)
+        else:
+            self._fitter = SharedFitter(brdf, shared, seed=seed, effort=self._effort)
+            self._head = PART.size
         self._bound = EnergyBound(brdf)
         self._step()
 
@@ -194,9 +203,8 @@ class Compressor:
         The quality is -inf if the material came out larger than `size` bytes.
         """
         nodes = int(np.clip(spread * usual_nodes(size), SMALLEST, LARGEST))
-        problem = self._fitter.problem(nodes)
-        gains, shapes = (min(MOST_ENTRIES, round(share * math.sqrt(nodes))) for share in (GAINS, SHAPES))
-        head = file.head_bytes(self._brdf.name, self._source)
+        problem, head = self._fitter.problem(nodes), self._head
+        gains, shapes = entries_for(nodes if problem.prior is None else problem.lattice.size)
         if size < 2 * head:  # less than half of the file would be left for the material
             raise MaterialError(
                 f"{self._brdf.name}: its name and source take {head} bytes of the {size} asked for; ask for at least "
@@ -276,6 +284,12 @@ def compress(
         progress(steps, steps)
     seconds = time.perf_counter() - started
     return material, CompactReport(found if quality else None, seconds, compressor.tried)
+
+
+def entries_for(nodes: int) -> tuple[int, int]:
+    """The largest numbers of gains and of shapes for so many nodes."""
+    gains, shapes = (min(MOST_ENTRIES, round(share * math.sqrt(nodes))) for share in (GAINS, SHAPES))
+    return gains, shapes
 
 
 def usual_nodes(size: int) -> int:

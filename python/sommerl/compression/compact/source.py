@@ -89,6 +89,12 @@ class FittedSource:
         weight = _weight(x, y, z, *((w[0][above], w[1][above], w[2][above]) for w in (wi, wo)))
         self._weights = weight / weight.mean()
 
+    def prepare(self, count: int) -> None:
+        """Draws directions, and takes the scale from what the source is there. Raises MaterialError if it is black."""
+        self.draw(count)
+        self.rescale(self._targets)
+        self._targets = self._targets / np.cbrt(self.scale)
+
     def problem(self, lattice: NodeLattice) -> Problem:
         """The least-squares problem of a lattice at random directions, with its solution by conjugate gradients."""
         if len(self._places) < DIRECTIONS_A_NODE * lattice.size / 2:  # of the directions drawn, at least half are above

@@ -35,8 +35,7 @@ from ...system.files import atomic_write
 from ...system.sealed_file import BYTE, Reader
 from ..material import SomManBrdf
 from ..palette import GainsAndShapes
-from . import notes
-from .codes import coordinates, gain_codes, gain_values, shape_codes, shape_values
+from . import node_parts, notes
 
 MAGIC = b"SMRL"
 SHORT = struct.Struct("<H")
@@ -168,35 +167,27 @@ def _from_cells(reader: Reader, known: dict[str, Any]) -> SomManBrdf:
 
 
 def _nodes(material: SomManBrdf) -> bytes:
-    entries, lattice = material.palette, material.lattice
-    assert isinstance(entries, GainsAndShapes)
+    palette, lattice = material.palette, material.lattice
+    assert isinstance(palette, GainsAndShapes)
     assert isinstance(lattice, NodeLattice)
-    gains, shapes = gain_codes(entries.gains), shape_codes(coordinates(entries.lut))
-    if not (np.array_equal(gain_values(gains), entries.gains) and np.array_equal(shape_values(shapes), entries.lut)):
-        raise FormatError(f"{material.name}: expected a palette whose values have codes, found others")
     try:
-        palette = _core.NodePalette(*lattice.axes(), gains.tolist(), shapes.tolist(), **lattice.folds)
+        coded = node_parts.coded(material)
         flags = RECIPROCAL * lattice.reciprocal | MIRRORED * lattice.mirrored
-        flags |= SIGNED * entries.signed | SMOOTH * entries.smooth
-        return SCALE.pack(entries.scale) + BYTE.pack(flags) + palette.encode(*material.index)
+        flags |= SIGNED * palette.signed | SMOOTH * palette.smooth
+        return SCALE.pack(palette.scale) + BYTE.pack(flags) + coded.encode(*material.index)
     except (ValueError, OverflowError) as error:
         raise FormatError(f"{material.name}: {error}") from error
 
 
 def _from_nodes(version: int, reader: Reader, known: dict[str, Any]) -> SomManBrdf:
     (scale,) = reader.unpack(SCALE)
-    if not 0 < scale < np.inf:
-        raise FormatError("expected a positive scale that is finite, found another")
     (flags,) = reader.unpack(BYTE) if version > 1 else (RECIPROCAL,)
     if flags > RECIPROCAL | MIRRORED | SIGNED | SMOOTH:
         raise FormatError(f"expected flags from 0 to 15, found {flags}")
     folds = bool(flags & RECIPROCAL), bool(flags & MIRRORED)
     try:
-        palette, (gain, shape) = _core.NodePalette.decode(reader.rest(), *folds, version)
+        palette, indices = _core.NodePalette.decode(reader.rest(), *folds, version)
     except ValueError as error:
         raise FormatError(str(error)) from error
-    theta_d, phi_d = (tuple(map(tuple, axes)) for axes in (palette.theta_d, palette.phi_d))
-    lattice = NodeLattice(tuple(palette.theta_h), tuple(palette.band), theta_d, phi_d, *folds)
-    shapes, gains = shape_values(np.array(palette.shapes)), gain_values(np.array(palette.gains))
-    entries = GainsAndShapes(gains, shapes, scale, bool(flags & SIGNED), bool(flags & SMOOTH))
-    return SomManBrdf(entries, np.stack([gain, shape]), lattice, **known)
+    domain = scale, bool(flags & SIGNED), bool(flags & SMOOTH)
+    return node_parts.material(palette, indices, node_parts.lattice_of(palette), domain, known)

@@ -6,7 +6,8 @@
     4      CRC-32 of the table that follows
     2      number of sections
     …      for each section: type, flags, length, CRC-32
-    …      the sections, one after the other: the index, and the materials in the order of the index
+    …      the sections, one after the other: the index; what materials share, if they do (`shared`); and the
+           materials in the order of the index
 
 All numbers are little-endian. Places are not in the file: a section, and a material, begins where the one before ends,
 so that none can overlap. A reader reads head and index, and of the materials those that are asked for.
@@ -29,19 +30,22 @@ from numpy.typing import NDArray
 from ...system.errors import FormatError, SommerlError
 from ...system.near import did_you_mean
 from ...system.sealed_file import DIGEST_BYTES, deflated, inflated
+from ..material import SomManBrdf
 from . import file, notes
+from .shared import Shared
 
 MAGIC, VERSION = b"SMLB", 1
 HEAD = struct.Struct("<4sHI")
 COUNT = struct.Struct("<H")
 SECTION = struct.Struct("<HHQI")  # type, flags, length, CRC-32
-INDEX, MATERIALS = 1, 2  # types of sections
+INDEX, MATERIALS, SHARED = 1, 2, 3  # types of sections
 NEEDED = 1  # flag: who does not know the section cannot read the file
 MOST_SECTIONS = 64
 INDEX_HEAD = struct.Struct("<IBIII")  # materials, metrics; bytes of common parts, of names, of sources
-SMRL = 0  # kind of a material: the bytes of a .smrl file
+SMRL, PART = 0, 1  # kinds of a material: the bytes of a .smrl file; what is its own beside what is shared
 LONGEST_TEXT = 2**14  # bytes of a name, or of a source, in UTF-8
 LONGEST_COMMON = 2**20  # bytes of options and names of metrics
+LONGEST_SHARED = 2**24  # bytes
 MOST_INFLATED, MOST_FOLD = 2**28, 64  # bytes of the index, inflated; and in units of the file's length
 PARTS = 10_000  # of 1, in which colour, gloss and metalness are stored
 LARGEST_PART = 2**16 - 1
@@ -84,42 +88,49 @@ def looks_like(head: bytes) -> bool:
     return head.startswith(MAGIC)
 
 
-def write(out: BinaryIO, entries: Sequence[Entry], read: Callable[[str], bytes]) -> int:
+def write(out: BinaryIO, entries: Sequence[Entry], read: Callable[[str], bytes], shared: Shared | None = None) -> int:
     """Writes a file of many materials; returns its length. The same materials give the same bytes in any order.
 
-    read: gives the .smrl of a material by its name; it is called twice, so that no more than one is in memory. Raises
+    read: gives the .smrl of a material by its name; it is called twice, so that no more than one is in memory. shared:
+    lattices; materials on them are written without, and lose what their notes say of what they were made from. Raises
     FormatError for what a reader would refuse, and if a material is another one at the second time.
     """
     ordered = sorted(entries, key=lambda entry: entry.name.encode("utf-8", "surrogatepass"))
-    lengths, sums = np.zeros(len(ordered), "<u4"), np.zeros(len(ordered), "<u4")
+    columns = {name: np.zeros(len(ordered), kind) for name, kind, _ in COLUMNS if name in ("length", "crc", "kind")}
     for number, entry in enumerate(ordered):
-        data = read(entry.name)
-        _check_material(entry.name, data)
-        lengths[number], sums[number] = len(data), zlib.crc32(data)
-    total = int(lengths.sum(dtype=np.int64))
-    index = _written(ordered, lengths, sums)
-    table = COUNT.pack(2) + SECTION.pack(INDEX, NEEDED, len(index), zlib.crc32(index))
+        kind, data = _kind(entry.name, read(entry.name), shared)
+        columns["length"][number], columns["crc"][number] = len(data), zlib.crc32(data)
+        columns["kind"][number] = kind
+    total = int(columns["length"].sum(dtype=np.int64))
+    index, common = _written(ordered, columns), shared.encode() if shared else b""
+    sections = [(INDEX, index), *([(SHARED, common)] if shared else [])]
+    table = COUNT.pack(len(sections) + 1)
+    for kind, data in sections:
+        table += SECTION.pack(kind, NEEDED, len(data), zlib.crc32(data))
     table += SECTION.pack(MATERIALS, NEEDED, total, 0)
-    head = HEAD.pack(MAGIC, VERSION, zlib.crc32(table)) + table + index
-    Index(index, total, len(head) + total)  # refuses what readers would
+    head = HEAD.pack(MAGIC, VERSION, zlib.crc32(table)) + table + index + common
+    Index(index, total, len(head) + total, shared is not None)  # refuses what readers would
     out.write(head)
-    for entry, crc in zip(ordered, sums.tolist(), strict=True):
-        data = read(entry.name)
+    for entry, crc in zip(ordered, columns["crc"].tolist(), strict=True):
+        _, data = _kind(entry.name, read(entry.name), shared)
         if zlib.crc32(data) != crc:
             raise FormatError(f"{entry.name}: expected the same file again, found another: it has changed meanwhile")
         out.write(data)
     return len(head) + total
 
 
-def _check_material(name: str, data: bytes) -> None:
+def _kind(name: str, data: bytes, shared: Shared | None) -> tuple[int, bytes]:
+    """How a .smrl is written: its kind, and its bytes. Raises FormatError for what is no .smrl."""
     try:
-        file.decode(data)
+        material = file.decode(data)
+        part = shared.part(material) if shared else None
     except FormatError as error:
         raise FormatError(f"{name}: {error}") from error
+    return (SMRL, data) if part is None else (PART, part)
 
 
-def _written(entries: Sequence[Entry], lengths: NDArray[Any], sums: NDArray[Any]) -> bytes:
-    """The bytes of the index."""
+def _written(entries: Sequence[Entry], known: Mapping[str, NDArray[Any]]) -> bytes:
+    """The bytes of the index. known: some of its columns."""
     metrics = sorted({name for entry in entries for name in entry.metrics})
     told = [_compact(entry.options) for entry in entries]
     options = sorted(set(told))
@@ -130,9 +141,7 @@ def _written(entries: Sequence[Entry], lengths: NDArray[Any], sums: NDArray[Any]
     columns: dict[str, Any] = {
         "name_length": [len(name) for name in names],
         "source_length": [len(source) for source in sources],
-        "length": lengths,
-        "crc": sums,
-        "kind": [SMRL] * len(entries),
+        **known,
         "options": [numbers[text] for text in told],
         "source_bytes": [entry.source_bytes for entry in entries],
         "source_sha256": [list(_digest(entry)) for entry in entries],
@@ -191,17 +200,20 @@ class LibraryFile:
         self.bytes = at + sum(size for _, size, _ in sections)
         if length is not None and length != self.bytes:
             raise FormatError(f"expected {self.bytes} bytes, found {length}: the file is cut off or damaged")
-        index = b""
+        index, self._shared = b"", None
         for kind, size, crc in sections:
+            most = {INDEX: MOST_INFLATED, SHARED: LONGEST_SHARED}.get(kind, size)
+            if size > most:
+                raise FormatError(f"expected a section of type {kind} of at most {most} bytes, found {size}")
             if kind == INDEX:
-                if size > MOST_INFLATED:
-                    raise FormatError(f"expected an index of at most {MOST_INFLATED} bytes, found {size}")
                 index = self._part(at, size, crc)
+            elif kind == SHARED:
+                self._shared = Shared.decode(self._part(at, size, crc))
             elif kind == MATERIALS:
                 self._start = at
             at += size
         (total,) = (size for kind, size, _ in sections if kind == MATERIALS)
-        self.index = Index(index, total, self.bytes)
+        self.index = Index(index, total, self.bytes, self._shared is not None)
 
     def data(self, name: str) -> bytes:
         """The .smrl of a material. Raises FormatError if there is none of that name, or it is damaged."""
@@ -209,7 +221,14 @@ class LibraryFile:
         if number is None:
             raise FormatError(self.index.no_such(name))
         start, size, crc = self.index.place(number)
-        return self._part(self._start + start, size, crc)
+        data = self._part(self._start + start, size, crc)
+        return data if self.index.kind(number) == SMRL else file.encode(self._whole(self.index.entry(number), data))
+
+    def _whole(self, entry: Entry, part: bytes) -> SomManBrdf:
+        """A material that shares a lattice."""
+        assert self._shared is not None
+        noted = {"options": entry.options, "metrics": entry.metrics}
+        return self._shared.material(part, {"name": entry.name, "source_sha256": entry.source_sha256} | noted)
 
     def _part(self, start: int, size: int, crc: int) -> bytes:
         data = self._read(start, size)
@@ -235,9 +254,10 @@ def _sections(data: bytes) -> tuple[list[tuple[int, int, int]], int]:
         raise FormatError("expected the checksum of the table of sections, found another: the file is damaged")
     found = [SECTION.unpack_from(data, HEAD.size + COUNT.size + n * SECTION.size) for n in range(count)]
     for kind, flags, _, _ in found:
-        if kind not in (INDEX, MATERIALS) and flags & NEEDED:
-            raise FormatError(f"expected sections of types {INDEX} and {MATERIALS}, found type {kind}, which is needed")
-    if any([kind for kind, *_ in found].count(kind) != 1 for kind in (INDEX, MATERIALS)):
+        if kind not in (INDEX, MATERIALS, SHARED) and flags & NEEDED:
+            raise FormatError(f"expected sections of types {INDEX} to {SHARED}, found type {kind}, which is needed")
+    kinds = [kind for kind, *_ in found]
+    if any(kinds.count(kind) != 1 for kind in (INDEX, MATERIALS)) or kinds.count(SHARED) > 1:
         raise FormatError("expected one index and one section of materials, found others")
     return [(kind, size, crc) for kind, _, size, crc in found], end
 
@@ -246,9 +266,10 @@ class Index:
     """The index of such a file: its materials in the order of their names' bytes, by their numbers.
 
     data: of the section. total: bytes of all materials. length: of the file, which bounds what the index may take.
+    shared: whether the file has what materials share.
     """
 
-    def __init__(self, data: bytes, total: int, length: int) -> None:
+    def __init__(self, data: bytes, total: int, length: int, shared: bool = False) -> None:
         if len(data) < INDEX_HEAD.size:
             raise FormatError(f"expected an index of at least {INDEX_HEAD.size} bytes, found {len(data)}")
         count, metrics, common, names, sources = INDEX_HEAD.unpack_from(data)
@@ -269,18 +290,18 @@ class Index:
         self._names = _ends(self._columns["name_length"], 0, names)
         self._sources = _ends(self._columns["source_length"], names, names + sources)
         self._places = _ends(self._columns["length"], 0, total)
-        self._check()
+        self._check(PART if shared else SMRL)
 
-    def _check(self) -> None:
+    def _check(self, last_kind: int) -> None:
         """Raises FormatError for names that are not UTF-8, empty, or not in order, and for numbers out of range."""
         names = [self._name(number) for number in range(self._count)]
         if any(a >= b for a, b in pairwise(names)) or b"" in names[:1]:
             raise FormatError("expected different names, sorted by their bytes, found others")
         kinds, options = self._columns["kind"], self._columns["options"]
-        if (kinds != SMRL).any():
-            raise FormatError(
-                f"expected materials of kind {SMRL}, found kind {kinds.max()}; a newer Sommerl may read it"
-            )
+        if (kinds > last_kind).any():
+            known = f"{SMRL}" if last_kind == SMRL else f"{SMRL} or {PART}"
+            found = f"found kind {kinds.max()}; a newer Sommerl may read it"
+            raise FormatError(f"expected materials of kind {known}, {found}")
         if self._count and options.max() >= len(self._options):
             raise FormatError(f"expected numbers of options below {len(self._options)}, found {options.max()}")
         texts = (self._columns[name].max(initial=0) for name in ("name_length", "source_length"))
@@ -322,6 +343,10 @@ class Index:
         """Where a material begins in the section of materials, its length, and its CRC-32."""
         start, end = self._places[number], self._places[number + 1]
         return start, end - start, int(self._columns["crc"][number])
+
+    def kind(self, number: int) -> int:
+        """How a material is written: SMRL, or PART."""
+        return int(self._columns["kind"][number])
 
     def entry(self, number: int) -> Entry:
         """All that the index says of a material."""
