@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, TypeVar, Unpack
 
 from .. import __version__
 from ..compression.material import SomManBrdf
@@ -19,6 +19,8 @@ from ..factored.material import FactoredBrdf
 from ..reflectance.table import BrdfTable
 from ..system.files import atomic_write
 from .data import RULES, Data, Learnt, digest_of
+
+T = TypeVar("T")
 
 MARK = "sommerl_cell"  # the key by which a cell's file is known
 REVISION = 1  # of what cells measure: a change of it makes all anew
@@ -62,6 +64,10 @@ class Setting:
     data: Data
     extent: Extent = FULL
     mesh: Path | None = None
+
+    def some(self, all_of: Iterable[T], count: int = 1) -> list[T]:
+        """All, or where few are asked for, the first ones."""
+        return list(all_of)[: count if self.extent.few else None]
 
     def learnt(self, table: BrdfTable, clusters: int, epochs: int = 30, **rule: Unpack[Learnt]) -> SomManBrdf:
         """A table, compressed with the preset `paper` and nearest lookup. rule: one of RULES."""

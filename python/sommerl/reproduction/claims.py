@@ -40,7 +40,7 @@ def noise(setting: Setting, material: str) -> Outcome:
     for m in setting.extent.clusters:
         found[f"M = {m}"] = setting.learnt(table, m).with_interpolation("trilinear")
         found[f"M = {m}, Eq. 2 as printed"] = setting.learnt(table, m, **RULES[PRINTED]).with_interpolation("trilinear")
-    for size in SIZES[: 1 if setting.extent.few else None]:
+    for size in setting.some(SIZES):
         found[f"compact, {size:,} B"] = compress(table, CompactOptions(target_size=size))[0]
     return Outcome({name: _distance(clean, judge, brdf) for name, brdf in found.items()})
 
@@ -81,7 +81,7 @@ def proper(setting: Setting, material: str) -> Outcome:
     """Fits to a noisy table and to its compressed form with M = 1000, both judged against the table without noise."""
     clean = setting.data.table(material)
     table = noisy(clean, SEED)
-    models = list(dict.fromkeys(key.split("/")[1] for key in printed("table1")))
+    models = setting.some(dict.fromkeys(key.split("/")[1] for key in printed("table1")), 2)
     options = FitOptions(samples=min(setting.extent.samples, SAMPLES), starts=setting.extent.starts)
     truth = samples_of(clean, options)
     forms = {NOISE: table, OURS: setting.learnt(table, 1000).with_interpolation("trilinear")}
@@ -99,11 +99,10 @@ def _error(fitted: Brdf, truth: Samples) -> float:
 
 
 def _plan(setting: Setting) -> Sequence[Cell]:
-    few = 1 if setting.extent.few else None
-    own = [Cell(f"claims/noise/{name}", noise, {"material": name}, (name,), 70.0) for name in NOISY[:few]]
+    own = [Cell(f"claims/noise/{name}", noise, {"material": name}, (name,), 70.0) for name in setting.some(NOISY)]
     own += [Cell("claims/reciprocity", reciprocity, {}, (BLUE,), 20.0), Cell("claims/memory", memory, {}, (BLUE,), 8.0)]
     materials = list(dict.fromkeys(key.split("/")[0] for key in printed("table1")))
-    own += [Cell(f"claims/fits/{name}", proper, {"material": name}, (name,), 90.0) for name in materials[:few]]
+    own += [Cell(f"claims/fits/{name}", proper, {"material": name}, (name,), 90.0) for name in setting.some(materials)]
     any_material = [cell for cell in field.BENCHMARK.plan(setting) if cell.name.endswith("/paper")]
     return [*own, *any_material, *times.TABLE2.plan(setting), *fits.TABLE1.plan(setting)]
 

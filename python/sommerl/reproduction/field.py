@@ -20,7 +20,7 @@ from .methods import METHODS, Source, short_name, speed
 from .printed import published
 from .section import Item, Outcomes, Picture, Section, Table, webp
 
-FEW_METHODS, FEW_MATERIALS = ("compact-1000", "paper", "som", "k-means-256", "network", "own", "table-nearest"), 1
+FEW_METHODS = ("compact-1000", "paper", "som", "k-means-256", "network", "own", "table-nearest")
 PICTURED = "nickel"  # a sharp highlight and rings, which each method loses in its own way
 SIDE, PAIRS = 200, 200_000  # of pictures, in pixels; pairs of directions of which the speed is measured
 COMPARED = 64  # samples a pixel at most: the references have the same directions, so noise cancels
@@ -68,9 +68,8 @@ def _lamp(source: Source, brdf: Any) -> dict[str, bytes]:
 
 def chosen(setting: Setting, materials: Sequence[str]) -> list[tuple[str, str]]:
     """Pairs of a material and a method."""
-    few = setting.extent.few
-    methods = [name for name in METHODS if not few or name in FEW_METHODS]
-    return [(each, name) for each in materials[: FEW_MATERIALS if few else None] for name in methods]
+    methods = [name for name in METHODS if not setting.extent.few or name in FEW_METHODS]
+    return [(each, name) for each in setting.some(materials) for name in methods]
 
 
 def _plan(setting: Setting, materials: Sequence[str]) -> list[Cell]:

@@ -8,6 +8,7 @@ from typing import Any
 from .report import VERDICTS
 
 MARK = "<!-- Written by Sommerl -->"
+MANY = 1e5  # from here on, numbers are whole and have commas
 HEADINGS = ("", "paper", "Eq. 2 as printed", "default", "difference", "verdict")
 
 
@@ -31,7 +32,9 @@ def document(content: Mapping[str, Any]) -> str:
 
 def of_number(value: float | None, unit: str) -> str:
     """A number as both pages show it."""
-    return "–" if value is None else f"{value:.5g} {unit}".rstrip()
+    if value is None:
+        return "–"
+    return f"{value:,.0f} {unit}".rstrip() if abs(value) >= MANY else f"{value:.5g} {unit}".rstrip()
 
 
 def of_difference(number: Mapping[str, Any]) -> str:

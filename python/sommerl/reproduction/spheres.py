@@ -38,9 +38,7 @@ def rate(setting: Setting, order: Order, alpha: float) -> Outcome:
     """The cases of Fig. 4 by Eq. 2 as printed, with another rate or another order."""
     table = setting.data.table(YELLOW).with_interpolation("nearest")
     most = setting.extent.epochs
-    options = [
-        TrainOptions(clusters=m, epochs=min(e, most), rule="paper", alpha=alpha, order=order) for m, e in CASES
-    ]
+    options = [TrainOptions(clusters=m, epochs=min(e, most), rule="paper", alpha=alpha, order=order) for m, e in CASES]
     found = compared(setting, table, [train(table, each)[0] for each in options])
     return Outcome({case_name(*case): each.metrics["psnr_frame_db"] for case, each in zip(CASES, found, strict=True)})
 
@@ -48,7 +46,7 @@ def rate(setting: Setting, order: Order, alpha: float) -> Outcome:
 def fig5(setting: Setting) -> Outcome:
     """The paper's representation and eight two-lobe fits."""
     table = setting.data.table(BLUE)
-    models = [name for name in printed("fig5") if name != SOM_MAN]
+    models = setting.some((name for name in printed("fig5") if name != SOM_MAN), 2)
     options = FitOptions(samples=setting.extent.samples, starts=setting.extent.starts)
     candidates: dict[str, Brdf] = {**setting.both(table, 256, 50)}
     candidates |= {fit.model: fit.brdf for fit in fit_models(table, models, options)}
@@ -72,11 +70,12 @@ def case_name(clusters: int, epochs: int) -> str:
 
 def _plan4(setting: Setting) -> Sequence[Cell]:
     cases = [
-        Cell(f"fig4/{m}-{e}", fig4, {"clusters": m, "epochs": e}, (YELLOW,), 20.0 if m > 64 else 14.0) for m, e in CASES
+        Cell(f"fig4/{m}-{e}", fig4, {"clusters": m, "epochs": e}, (YELLOW,), 20.0 if m > 64 else 14.0)
+        for m, e in setting.some(CASES)
     ]
     rates = [
         Cell(f"fig4/rates/{order}-{alpha:g}", rate, {"order": order, "alpha": alpha}, (YELLOW,), 25.0)
-        for order in get_args(Order)
+        for order in setting.some(get_args(Order))
         for alpha in setting.extent.rates
     ]
     return [*cases, *rates]
@@ -86,7 +85,7 @@ def _show4(setting: Setting, outcomes: Outcomes) -> Section:
     ours: dict[str, Ours] = {}
     pictures: list[Picture] = []
     rows: list[list[str]] = []
-    for m, e in CASES:
+    for m, e in setting.some(CASES):
         outcome = outcomes[f"fig4/{m}-{e}"]
         frame = {title: outcome.values[title]["psnr_frame_db"] for title in RULES}
         ours[case_name(m, e)] = Ours(f"{m}-{e}", frame[DEFAULT], frame[PRINTED])

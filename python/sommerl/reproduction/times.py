@@ -81,9 +81,9 @@ def _representations(setting: Setting, material: str) -> dict[str, Brdf]:
     options = CompactOptions(target_size=1000 if setting.extent.few else 8000)
     found: dict[str, Brdf] = {OURS: setting.learnt(table, 256), RAW: table.with_interpolation("nearest")}
     found |= {COMPACT: compress(table, options)[0], LAWRENCE: setting.factored(table)}
-    models = [name for name, family in FAMILIES.items() if not family.diffuse]
+    models = setting.some((name for name, family in FAMILIES.items() if not family.diffuse), 2)
     samples = min(setting.extent.samples, SAMPLES)
-    for model, lobes in [*((name, 2) for name in models), *((name, 3) for name in LOBES)]:
+    for model, lobes in [*((name, 2) for name in models), *((name, 3) for name in setting.some(LOBES))]:
         chosen = FitOptions(lobes=lobes, samples=samples, starts=min(setting.extent.starts, 6))
         found[f"{model}, {lobes} lobes"] = fit(table, model, chosen).brdf
     return found
@@ -91,7 +91,10 @@ def _representations(setting: Setting, material: str) -> dict[str, Brdf]:
 
 def _plan(setting: Setting) -> Sequence[Cell]:
     materials = dict.fromkeys(key.split("/")[0] for key in printed("table2"))
-    return [Cell(f"table2/{name}", table2, {"material": name}, (name,), 240.0, alone=True) for name in materials]
+    return [
+        Cell(f"table2/{name}", table2, {"material": name}, (name,), 240.0, alone=True)
+        for name in setting.some(materials)
+    ]
 
 
 def _show(setting: Setting, outcomes: Outcomes) -> Section:
