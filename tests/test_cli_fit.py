@@ -2,12 +2,14 @@
 
 import csv
 import json
+from functools import partial
 
 import numpy as np
 import pytest
 from helpers import must_fail, run, run_json
 
 from sommerl import NAMES, BrdfTable, builtin
+from sommerl.commands import fit as command
 from sommerl.formats import merl
 from sommerl.models.multi_lobe import FAMILIES
 from sommerl.reproduction.data import described, expected, material
@@ -15,7 +17,8 @@ from sommerl.reproduction.data import described, expected, material
 QUICK = ["--samples", "2000", "--starts", "3"]
 
 
-def test_fit_and_what_it_writes(capsys, tmp_path):
+def test_fit_and_what_it_writes(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(command, "compare_on_sphere", partial(command.compare_on_sphere, size=32, spp=8))
     output, picture = tmp_path / "fits.json", tmp_path / "fits.png"
     arguments = ["red-fabric", *QUICK, "--model", "ward", "--lobes", "3", "-o", output, "--picture", picture]
     result = run_json(capsys, "fit", *arguments)
