@@ -41,7 +41,7 @@ def main() -> int:
     parser.add_argument("out", type=Path)
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--data", type=Path, default=Path(__file__).resolve().parents[3] / "shared" / "data" / "np")
+    parser.add_argument("--data", type=Path, default=Path(__file__).resolve().parents[2] / "shared" / "data" / "np")
     parser.add_argument("--bases", help="names of stand-ins, between commas (all)")
     options = parser.parse_args()
     names = sorted(path.name.removesuffix("_latentVector.npy") for path in (options.data / "latent").glob("*.npy"))

@@ -1,19 +1,22 @@
 """The command `fit`."""
 
 import json
+from functools import partial
 
 import numpy as np
 import pytest
 from helpers import run, run_json
 
 from sommerl import BrdfTable, builtin
+from sommerl.commands import fit as command
 from sommerl.formats import merl
 from sommerl.models.multi_lobe import FAMILIES
 
 QUICK = ["--samples", "2000", "--starts", "3"]
 
 
-def test_fit_and_what_it_writes(capsys, tmp_path):
+def test_fit_and_what_it_writes(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(command, "compare_on_sphere", partial(command.compare_on_sphere, size=32, spp=8))
     output, picture = tmp_path / "fits.json", tmp_path / "fits.png"
     arguments = ["red-fabric", *QUICK, "--model", "ward", "--lobes", "3", "-o", output, "--picture", picture]
     result = run_json(capsys, "fit", *arguments)

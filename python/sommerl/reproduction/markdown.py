@@ -34,11 +34,15 @@ def of_number(value: float | None, unit: str) -> str:
     """A number as both pages show it."""
     if value is None:
         return "–"
+    if unit == "dB":
+        return f"{value:.2f} dB"
     return f"{value:,.0f} {unit}".rstrip() if abs(value) >= MANY else f"{value:.5g} {unit}".rstrip()
 
 
 def of_difference(number: Mapping[str, Any]) -> str:
-    return "–" if number["difference"] is None else f"{number['difference']:+.3g}"
+    if number["difference"] is None:
+        return "–"
+    return f"{number['difference']:+.2f}" if number["unit"] == "dB" else f"{number['difference']:+.3g}"
 
 
 def of_interval(number: Mapping[str, Any]) -> str:
@@ -83,7 +87,7 @@ def _numbers(numbers: Sequence[Mapping[str, Any]]) -> list[str]:
         for number in numbers
     ]
     notes = [f"{letter}: {reason}." for reason, letter in letters.items()]
-    return [*_table(HEADINGS, rows), "", *notes, "", f"One alone: `{numbers[0]['command']}`"]
+    return [*_table(HEADINGS, rows), "", *(f"{note}  " for note in notes), "", f"One alone: `{numbers[0]['command']}`"]
 
 
 def _verdict(verdict: str) -> str:

@@ -83,9 +83,12 @@ def _item(item: Mapping[str, Any], pictures: Mapping[str, bytes]) -> str:
 def _numbers(numbers: Sequence[Mapping[str, Any]]) -> str:
     letters = reasons(numbers)
     rows: list[str] = []
+    commands = list(dict.fromkeys(number["command"] for number in numbers))
+    alone = f'<p class="note">Alone: <code>{_html(commands[0])}</code></p>' if len(commands) == 1 else ""
     for number in numbers:
         unit, mark = number["unit"], letters.get(number["reason"])
-        name = f"{_html(number['key'].replace('/', ', '))}<br><code>{_html(number['command'])}</code>"
+        command = "" if alone else f"<br><code>{_html(number['command'])}</code>"
+        name = _html(number["key"].replace("/", ", ")) + command
         worse = ' class="worse"' if number["verdict_eq2"] == "worse" else ""
         cells = [
             (_html(of_number(number["paper"], unit)), ""),
@@ -100,7 +103,7 @@ def _numbers(numbers: Sequence[Mapping[str, Any]]) -> str:
         )
         rows.append(f"<tr><td>{name}</td>{shown}</tr>")
     notes = "".join(f'<p class="note"><sup>{letter}</sup> {_html(reason)}.</p>' for reason, letter in letters.items())
-    return _scrolled(HEADINGS, rows, "numbers") + notes
+    return _scrolled(HEADINGS, rows, "numbers") + notes + alone
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

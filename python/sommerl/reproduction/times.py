@@ -135,7 +135,9 @@ def _told(material: str, seconds: Mapping[str, Ratios]) -> list[str]:
         if high <= goal:
             verdict = f"at most {goal:g} times"
         else:
-            verdict = f"more than {goal:g} times" if low > goal else f"{goal:g} times cannot be told apart from it"
+            verdict = (
+                f"more than {goal:g} times" if low > goal else f"whether it is at most {goal:g} times, cannot be told"
+            )
         found.append(
             f"{material}: the paper's representation takes {median:.3f} times the time of {peer} ({low:.3f} to "
             f"{high:.3f}): "

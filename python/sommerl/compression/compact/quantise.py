@@ -192,8 +192,7 @@ def _som(x: Floats, weight: Floats, units: int, seed: int) -> NDArray[np.int64]:
     places = (np.sort(random.random_raw(count)) >> 11) * 2.0**-53
     drawn = np.searchsorted(np.cumsum(weight) / weight.sum(), places, side="right").clip(0, len(x) - 1)
     drawn = drawn[np.argsort(random.random_raw(count), kind="stable")]
-    distinct = np.unique(triples[drawn], axis=0)
-    first = distinct[np.argsort(random.random_raw(len(distinct)), kind="stable")[:units]]
+    first = _apart(*np.unique(triples[drawn], axis=0, return_counts=True), units, random)
     learner = _core.Learner(triples[drawn], drawn.astype(np.uint32), first, "kohonen", len(first))
     alpha, falloff = SOM_ALPHA, np.ones(1, np.float32)
     for _ in range(SOM_EPOCHS):
@@ -205,6 +204,25 @@ def _som(x: Floats, weight: Floats, units: int, seed: int) -> NDArray[np.int64]:
     filled = stored != EMPTY
     distance = ((triples[np.where(filled, stored, 0)] - weights[:, None]) ** 2).sum(axis=-1)
     return stored[np.arange(len(stored)), np.where(filled, distance, np.inf).argmin(axis=1)]
+
+
+def _apart(
+    values: NDArray[np.float32], counts: NDArray[np.int64], units: int, random: np.random.PCG64
+) -> NDArray[np.float32]:
+    """The first weights of at most that many units: some of the distinct values (n, 3), presented so many times (n).
+
+    Each is drawn with a probability in proportion to its count and to its squared distance from the nearest one drawn
+    before (Arthur & Vassilvitskii, k-means++, 2007). Values drawn by count alone crowd where nodes do, and few units
+    reach the rare ones: the error of smooth materials was up to twice as large (purple-paint, 1,000 bytes).
+    """
+    first = [int(random.random_raw()) % len(values)]
+    away = np.full(len(values), np.inf, np.float32)
+    while len(first) < min(units, len(values)):
+        away = np.minimum(away, ((values - values[first[-1]]) ** 2).sum(axis=1))
+        sums: Floats = np.cumsum(away * counts, dtype=np.float64)
+        place = (int(random.random_raw()) >> 11) * 2.0**-53 * float(sums[-1])
+        first.append(min(int(np.searchsorted(sums, place, side="right")), len(values) - 1))
+    return values[first]
 
 
 def _k_means(x: Floats, weight: Floats, units: int, seed: int) -> NDArray[np.int64]:
