@@ -45,7 +45,7 @@ def made(items: Sequence[str], setting: Setting, outcomes: Mapping[str, Outcome]
         "title": "Representing BRDFs Using SOMs and MANs, reproduced",
         "data": setting.data.caption,
         "extent": setting.extent.name,
-        "figure": setting.mesh.name if setting.mesh else None,
+        "figure": setting.mesh.name if setting.mesh and "fig1" in items else None,
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
         "versions": {"sommerl": __version__, "python": platform.python_version(), **_versions()},
         "machine": _machine(),

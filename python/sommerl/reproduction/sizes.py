@@ -17,7 +17,7 @@ from .section import Item, Ours, Outcomes, Section, Table
 BLUE = "blue-metallic-paint"
 CLUSTERS = (64, 256, 1000)
 DEFAULT, PRINTED = RULES
-MIB, MB, KB = 2**20, 1e6, 1e3
+MIB, KB = 2**20, 1e3
 
 
 def sizes(setting: Setting) -> Outcome:
@@ -48,12 +48,12 @@ def _show(setting: Setting, outcomes: Outcomes) -> Section:
         return Ours("bytes", *(found[above] / found[below.format(title)] for title in RULES))
 
     ours = {
-        "table/raw table": Ours("bytes", found["table"] / MB),
-        "float/raw table in single precision": Ours("bytes", found["single"] / MB),
-        "compressed/raw table, compressed": Ours("bytes", found["table, compressed"] / MB),
+        "table/raw table": Ours("bytes", found["table"] / MIB),
+        "float/raw table in single precision": Ours("bytes", found["single"] / MIB),
+        "compressed/raw table, compressed": Ours("bytes", found["table, compressed"] / MIB),
         "ours/M = 64": both_of("M = 64, {}", MIB),
         "ours/M = 1000": both_of("M = 1000, {}", MIB),
-        "text/M = 256": both_of("M = 256, {}", MB),
+        "text/M = 256": both_of("M = 256, {}", MIB),
         "file/M = 256, compressed": both_of("M = 256, {}, file", KB),
         "lawrence/Lawrence, in memory": Ours("bytes", found["lawrence"] / KB),
         "lawrence/Lawrence, compressed": Ours("bytes", found["lawrence, file"] / KB),
