@@ -23,6 +23,7 @@ from .data import RULES, Data, Learnt, digest_of
 T = TypeVar("T")
 
 MARK = "sommerl_cell"  # the key by which a cell's file is known
+FEW_CLUSTERS = 64  # at most, where few of everything are asked for
 REVISION = 1  # of what cells measure: a change of it makes all anew
 KINDS = {b"\x89PNG": "png", b"<svg": "svg", b"RIFF": "webp"}  # of pictures, by how they begin
 
@@ -71,6 +72,8 @@ class Setting:
 
     def learnt(self, table: BrdfTable, clusters: int, epochs: int = 30, **rule: Unpack[Learnt]) -> SomManBrdf:
         """A table, compressed with the preset `paper` and nearest lookup. rule: one of RULES."""
+        if self.extent.few:
+            clusters = min(clusters, FEW_CLUSTERS)
         return train(table, TrainOptions(clusters=clusters, epochs=min(epochs, self.extent.epochs), **rule))[0]
 
     def both(self, table: BrdfTable, clusters: int, epochs: int = 30) -> dict[str, SomManBrdf]:

@@ -7,12 +7,14 @@ is measured against what the formula was fitted to.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..compression.material import SomManBrdf
 from ..fitting import Fit, FitOptions, fit_models
 from ..reflectance.brdf import Brdf
+from ..reflectance.table import BrdfTable
 from .cells import Cell, Outcome, Setting
 from .data import RULES
 from .printed import printed
@@ -26,18 +28,18 @@ DEFAULT, PRINTED = RULES
 
 def table1(setting: Setting, material: str, model: str) -> Outcome:
     """A two-lobe model, fitted to a table and to its compressed forms."""
-    fits = _fitted(setting, material, [model], 2)
+    table = setting.data.table(material)
+    fits = _fitted(setting, table, setting.both(table, CLUSTERS), [model], 2)
     return Outcome({name: found[0].error for name, found in fits.items()})
 
 
 def fig6(setting: Setting) -> Outcome:
     """Three-lobe models, and all of them on the sphere."""
     models = setting.some(dict.fromkeys(key.split("/")[1] for key in printed("fig6")))
-    fits = _fitted(setting, GREEN, models, 3)
     table = setting.data.table(GREEN)
-    candidates: dict[str, Brdf] = {
-        f"M = {CLUSTERS}, {title}": form for title, form in setting.both(table, CLUSTERS).items()
-    }
+    learnt = setting.both(table, CLUSTERS)
+    fits = _fitted(setting, table, learnt, models, 3)
+    candidates: dict[str, Brdf] = {f"M = {CLUSTERS}, {title}": form for title, form in learnt.items()}
     candidates |= {f"{fit.model}, fitted to {name}": fit.brdf for name, found in fits.items() for fit in found}
     comparisons = compared(setting, table.with_interpolation("nearest"), list(candidates.values()))
     named = dict(zip(candidates, comparisons, strict=True))
@@ -45,11 +47,12 @@ def fig6(setting: Setting) -> Outcome:
     return Outcome({"errors": errors, "psnr": {n: c.metrics["psnr_frame_db"] for n, c in named.items()}}, shown(named))
 
 
-def _fitted(setting: Setting, material: str, models: Sequence[str], lobes: int) -> dict[str, list[Fit]]:
+def _fitted(
+    setting: Setting, table: BrdfTable, learnt: Mapping[str, SomManBrdf], models: Sequence[str], lobes: int
+) -> dict[str, list[Fit]]:
     """Fits to a table, and to its compressed forms, by what they are fitted to."""
-    table = setting.data.table(material)
     options = FitOptions(lobes=lobes, samples=setting.extent.samples, starts=setting.extent.starts)
-    forms = {title: form.with_interpolation("trilinear") for title, form in setting.both(table, CLUSTERS).items()}
+    forms = {title: form.with_interpolation("trilinear") for title, form in learnt.items()}
     return {name: fit_models(brdf, models, options) for name, brdf in {TABLE: table, **forms}.items()}
 
 
