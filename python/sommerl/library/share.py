@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..compression.compact.search import Compressor
-from ..compression.compact.sharing import Example, train
+from ..compression.compact.sharing import Example, examples_used, train
 from ..compression.paper.measured import rounded
 from ..compression.smrl import file, library_file
 from ..compression.smrl.library_file import Entry
@@ -24,7 +24,8 @@ from .pack import check_packed
 from .record import Record
 from .sources import Material
 
-Progress = Callable[[str, int, int], None]  #: what is being done, how many are done, how many in all
+SMALLEST_PART, LARGEST_PART = 200, LARGEST_SIZE  # bytes
+Progress = Callable[[int, int], None]  #: steps done, steps in all
 
 
 @dataclass(frozen=True)
@@ -46,20 +47,23 @@ def pack_shared(
 
     folder: of the sources that the library was built from. Each material is compressed from its source again, onto the
     shared lattice that fits it best, and measured against it. Raises MaterialError for an empty library, for sources
-    that are gone or have changed, and for materials of the preset `paper`; and as `pack.pack` does.
+    that are gone or have changed; OptionError for a size out of range; and as `pack.pack` does.
     """
+    if not SMALLEST_PART <= size <= LARGEST_PART:
+        raise OptionError(f"shared: expected {SMALLEST_PART} to {LARGEST_PART} bytes, found {size}")
     check_packed(library, path)
 
-    def step(what: str, done: int, total: int) -> None:
+    def step(done: int, total: int) -> None:
         if progress:
-            progress(what, done, total)
+            progress(done, total + len(records))
 
     found = {each.name: each for each in sources.find(folder, Path(library.path), lambda _: None).materials}
     records = library.records
     for record in records:
         _check_source(folder, record, found)
     examples = [_example(library, record, found[record.name]) for record in records]
-    shared = train(examples, size, seed=seed, progress=lambda done, total: step("learning", done, total))
+    learnt = examples_used(examples)
+    shared = train(examples, size, seed=seed, progress=step)
     data, entries = dict[str, bytes](), list[Entry]()
     whole, metrics = dict[str, str](), dict[str, Mapping[str, float]]()
     for number, record in enumerate(records):
@@ -72,7 +76,7 @@ def pack_shared(
         except MaterialError as error:
             data[record.name], whole[record.name] = library.data(record.name), str(error)
         entries.append(entry)
-        step("packing", number + 1, len(records))
+        step(learnt + number + 1, learnt)
     with atomic_write(path) as out:
         written = library_file.write(out, entries, data.__getitem__, shared)
     return Packed(written, len(shared.encode()), metrics, whole)

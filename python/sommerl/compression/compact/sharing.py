@@ -69,6 +69,11 @@ def train(
     return Shared(tuple(lattices), (weights.tolist(), levels.tolist()))
 
 
+def examples_used(examples: Sequence[Example]) -> int:
+    """How many of the examples `train` learns from."""
+    return sum(map(len, _groups(examples)))
+
+
 def _groups(examples: Sequence[Example]) -> list[list[Example]]:
     """Examples that fold φ_d alike and are of like gloss, evenly chosen, EXAMPLES at most in each."""
     found: list[list[Example]] = []

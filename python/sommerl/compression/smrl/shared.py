@@ -91,9 +91,10 @@ class Shared:
         Raises FormatError for what no file can hold.
         """
         lattice, palette = material.lattice, material.palette
-        if not isinstance(lattice, NodeLattice) or lattice not in self.lattices:
+        if not isinstance(lattice, NodeLattice) or not isinstance(palette, GainsAndShapes):
             return None
-        assert isinstance(palette, GainsAndShapes)
+        if lattice not in self.lattices:
+            return None
         flags = SIGNED * palette.signed | SMOOTH * palette.smooth
         try:
             stream = node_parts.coded(material, self.prior).encode(*material.index)
