@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..compression.compact.search import Compressor
+from ..compression.compact.search import LARGEST_SIZE, Compressor
 from ..compression.compact.sharing import Example, examples_used, train
 from ..compression.paper.measured import rounded
 from ..compression.smrl import file, library_file
@@ -16,7 +16,7 @@ from ..formats.load import load
 from ..reflectance.brdf import Brdf
 from ..reflectance.reciprocal import reciprocal
 from ..render.judge import Judge
-from ..system.errors import MaterialError
+from ..system.errors import MaterialError, OptionError
 from ..system.files import atomic_write
 from . import sources
 from .library import Library, entry_of

@@ -21,7 +21,7 @@ import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from math import isnan
+from math import isfinite, isnan
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -227,7 +227,9 @@ class LibraryFile:
     def _whole(self, entry: Entry, part: bytes) -> SomManBrdf:
         """A material that shares a lattice."""
         assert self._shared is not None
-        noted = {"options": entry.options, "metrics": entry.metrics}
+        # A .smrl holds finite figures only.
+        finite = {name: value for name, value in entry.metrics.items() if isfinite(value)}
+        noted = {"options": entry.options, "metrics": finite}
         return self._shared.material(part, {"name": entry.name, "source_sha256": entry.source_sha256} | noted)
 
     def _part(self, start: int, size: int, crc: int) -> bytes:

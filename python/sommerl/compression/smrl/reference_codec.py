@@ -35,10 +35,34 @@ def decode(
     FormatError for a stream that is not valid.
     """
     coder = Decoder(data)
-    theta_h, band, theta_d, phi_d = lattice = _lattice(coder, mirrored)
+    lattice = _lattice(coder, mirrored)
+    return *lattice, *_rest(coder, len(data), lattice, mirrored, version, None)
+
+
+def decode_part(
+    data: bytes, lattice: Lattice, mirrored: bool, prior: tuple[list[list[float]], list[float]]
+) -> tuple[list[int], list[Shape], list[int], list[int]]:
+    """Decodes a part, whose lattice is shared: gain_codes, shape_codes, gain_index, shape_index; see *Shared parts*.
+
+    lattice: theta_h, band, theta_d, phi_d. prior: weights (3, 10), and usual errors (3). Raises FormatError as `decode`
+    does.
+    """
+    return _rest(Decoder(data), len(data), lattice, mirrored, 2, prior)
+
+
+def _rest(
+    coder: Decoder,
+    length: int,
+    lattice: Lattice,
+    mirrored: bool,
+    version: int,
+    prior: tuple[list[list[float]], list[float]] | None,
+) -> tuple[list[int], list[Shape], list[int], list[int]]:
+    """What a stream of `length` bytes holds after the lattice."""
+    _, band, theta_d, phi_d = lattice
     gains, shapes = _palette(coder, version)
-    model = Model(lattice, mirrored, gains, shapes)
-    most = min(MOST_REACHED, REACHED_BY_ANY + REACHED_A_BYTE * len(data))
+    model = Model(lattice, mirrored, gains, shapes, prior)
+    most = min(MOST_REACHED, REACHED_BY_ANY + REACHED_A_BYTE * length)
     gain_index: list[int] = []
     shape_index: list[int] = []
     for row, b in enumerate(band):
@@ -54,7 +78,7 @@ def decode(
                 gain_index.append(gain)
                 shape_index.append(shape)
     coder.check_end()
-    return theta_h, band, theta_d, phi_d, gains, shapes, gain_index, shape_index
+    return gains, shapes, gain_index, shape_index
 
 
 class Decoder:

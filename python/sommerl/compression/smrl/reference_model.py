@@ -34,12 +34,16 @@ class Model:
         mirrored: bool,
         gains: list[int],
         shapes: list[tuple[int, int]],
+        prior: tuple[list[Floats], Floats] | None = None,
     ) -> None:
         _, self._band, self._theta_d, self._phi_d = lattice
         self._mirrored = mirrored
         places = [[code / OCTAVE for code in gains], *([shape[axis] / UNIT for shape in shapes] for axis in (0, 1))]
         self._places = places
         self._predictors = [Predictor(values) for values in places]
+        if prior:
+            for predictor, weights, level in zip(self._predictors, *prior, strict=True):
+                predictor.begin_with(weights, level)
         self._gains, self._shapes = Entries(places[0], [0.0] * len(gains)), Entries(places[1], places[2])
         self._present = self._above = self._higher = _plane(0)
 
@@ -152,6 +156,11 @@ class Predictor:
         self._w = [0.5, 0.5, 0.0, 0.0, -0.5, -0.5, 0.0, 0.0, 0.0, 0.0]
         self._matrix = [[25.0 / variance if i == j else 0.0 for j in NEIGHBOURS] for i in NEIGHBOURS]
         self._level = 0.15 * math.sqrt(variance)
+
+    def begin_with(self, weights: Floats, level: float) -> None:
+        """Takes over what was learnt before. To be called before the first node."""
+        self._w, self._level = list(weights), level
+        self._matrix = [[0.1 * entry for entry in row] for row in self._matrix]
 
     def predict(self, up: float, values: Floats, errors: Floats) -> None:
         """Makes a prediction. up, values: of the neighbours. errors: of earlier predictions at neighbouring nodes."""

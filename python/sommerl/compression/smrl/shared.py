@@ -105,14 +105,15 @@ class Shared:
     def material(self, part: bytes, known: dict[str, Any]) -> SomManBrdf:
         """The material of such bytes. known: other arguments of `SomManBrdf`. Raises FormatError for other bytes."""
         reader = Reader(part, 0)
-        number, flags, scale = reader.unpack(PART)
+        fields = reader.unpack(PART)
+        number, flags, scale = int(fields[0]), int(fields[1]), float(fields[2])
         if number >= len(self.lattices) or flags & ~(SIGNED | SMOOTH):
             raise FormatError(f"expected the number of a shared lattice and its flags, found {number} and {flags}")
         try:
             palette, indices = _even(self, number).decode_part(reader.rest())
         except ValueError as error:
             raise FormatError(str(error)) from error
-        domain = float(scale), bool(flags & SIGNED), bool(flags & SMOOTH)
+        domain = scale, bool(flags & SIGNED), bool(flags & SMOOTH)
         return node_parts.material(palette, indices, self.lattices[number], domain, known)
 
 
