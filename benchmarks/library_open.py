@@ -22,7 +22,7 @@ import numpy as np
 
 from sommerl import Library
 from sommerl.compression.smrl import file, library_file
-from sommerl.compression.smrl.library_file import Entry
+from sommerl.compression.smrl.library_index import Entry
 
 METRICS = {"psnr_soft_db": 50, "psnr_lamp_db": 40, "log_error": 0.1, "log_error_grazing": 0.2, "albedo_ratio": 1}
 

@@ -7,7 +7,8 @@ import zlib
 from pathlib import Path
 
 from sommerl.compression.smrl import file
-from sommerl.compression.smrl.library_file import COUNT, HEAD, INDEX_HEAD, SECTION, Entry, LibraryFile, write
+from sommerl.compression.smrl.library_file import COUNT, HEAD, SECTION, LibraryFile, write
+from sommerl.compression.smrl.library_index import INDEX_HEAD, Entry
 from sommerl.library import index
 from sommerl.library.record import Record
 from sommerl.library.traits import traits

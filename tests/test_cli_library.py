@@ -6,7 +6,8 @@ import pytest
 from helpers import complaint, must_fail, run, run_json
 from library_files import MATERIALS, folder
 
-from sommerl import load
+from sommerl import Library, load
+from sommerl.render.judge import Judge
 
 NAMES = sorted(MATERIALS)
 RED, BLUE = (0.4, 0.02, 0.02), (0.02, 0.02, 0.4)
@@ -40,6 +41,44 @@ def test_pack(capsys, tmp_path, made):
     assert (
         "other than the input" in run(capsys, "library", "pack", tmp_path / "x.smrlib", "-o", tmp_path / "x.smrlib")[2]
     )
+
+
+def check_shared(found, library, sources, most):
+    """Each material takes at most so many bytes, and is as far from its source as is said."""
+    assert found["whole"] == {}
+    with Library(library) as packed:
+        for each in found["materials"]:
+            record = packed.record(each["name"])
+            assert record.bytes <= most
+            metrics = Judge(load(sources / record.source)).metrics(packed[each["name"]])
+            for key, value in metrics.items():
+                assert each[key] == pytest.approx(value, rel=1e-6)
+                assert record.metrics[key] == pytest.approx(value, rel=1e-5)
+
+
+def test_pack_shared(capsys, tmp_path):
+    sources, made, out = tmp_path / "in", tmp_path / "made", tmp_path / "x.smrlib"
+    sources.mkdir()
+    for name in ("cells", "nodes/both"):
+        (sources / f"{name.replace('/', '-')}.smrl").write_bytes(MATERIALS[name])
+    run_json(capsys, "library", "build", sources, "-o", made, "--target-size", 500, "--effort", 1, "--jobs", 1)
+    pack = "library", "pack", made, "-o", out, "--shared"
+    found = run_json(capsys, *pack, 300, "--sources", sources)
+    check_shared(found, out, sources, 300)
+    must_fail(check_shared, found, out, sources, 100)
+    assert found["bytes_disk"] == out.stat().st_size
+    assert {"mean", "worst", "worst_name"} == found["quality"]["psnr_soft_db"].keys()
+    assert load(f"{out}:cells").eval([0, 0, 1], [0, 0, 1]).shape == (3,)
+    status, said, _ = run(capsys, *pack, "0.3kB", "--sources", sources)
+    assert (status, said.startswith("2 materials → ")) == (0, True)
+    assert "dB in soft light" in said
+    assert "expected both" in run(capsys, *pack, 300)[2]
+    assert "expected both" in run(capsys, "library", "pack", made, "-o", out, "--sources", sources)[2]
+    assert "--shared: expected 200" in run(capsys, *pack, 100, "--sources", sources)[2]
+    (sources / "cells.smrl").write_bytes(MATERIALS["nodes/neither"])
+    assert "found it changed" in run(capsys, *pack, 300, "--sources", sources)[2]
+    (sources / "cells.smrl").unlink()
+    assert "found none" in run(capsys, *pack, 300, "--sources", sources)[2]
 
 
 def check_list(found, names):

@@ -9,7 +9,7 @@ from helpers import complaint, must_fail
 from library_files import GOLDEN, MATERIALS, apart, entry, everything, opened, packed, together
 
 from sommerl.compression.smrl import library_file
-from sommerl.compression.smrl.library_file import COLUMNS, INDEX_HEAD, ROW, Index
+from sommerl.compression.smrl.library_index import COLUMNS, INDEX_HEAD, ROW, Index
 from sommerl.system.errors import FormatError
 
 WHOLE = packed()

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from ..compression.material import SomManBrdf
 from ..compression.smrl import file
-from ..compression.smrl.library_file import MOST_INFLATED, LibraryFile, looks_like
+from ..compression.smrl.library_file import LibraryFile, looks_like
+from ..compression.smrl.library_index import MOST_INFLATED
 from ..system.door import File
 from ..system.errors import FormatError, told_of
 from .format import Format

@@ -12,7 +12,8 @@ from typing import Any, Protocol, Self
 
 from ..compression.material import SomManBrdf
 from ..compression.smrl import file
-from ..compression.smrl.library_file import Entry, LibraryFile
+from ..compression.smrl.library_file import LibraryFile
+from ..compression.smrl.library_index import Entry
 from ..system import door
 from ..system.errors import FormatError, MaterialError, told_of
 from ..system.near import did_you_mean

@@ -10,7 +10,7 @@ from ..compression.compact.search import LARGEST_SIZE, Compressor
 from ..compression.compact.sharing import Example, examples_used, train
 from ..compression.paper.measured import rounded
 from ..compression.smrl import file, library_file
-from ..compression.smrl.library_file import Entry
+from ..compression.smrl.library_index import Entry
 from ..compression.smrl.shared import Shared
 from ..formats.load import load
 from ..reflectance.brdf import Brdf
