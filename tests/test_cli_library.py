@@ -81,7 +81,7 @@ def test_pack_shared(capsys, tmp_path):
     assert "expected both" in run(capsys, "library", "pack", made, "-o", out, "--sources", sources)[2]
     assert "--shared: expected 200" in run(capsys, *pack, 100, "--sources", sources)[2]
     (sources / "gold.smrl").write_bytes(MATERIALS["nodes/neither"])
-    assert "found it changed" in run(capsys, *pack, 300, "--sources", sources)[2]
+    assert "found another content" in run(capsys, *pack, 300, "--sources", sources)[2]
     (sources / "gold.smrl").unlink()
     assert "found none" in run(capsys, *pack, 300, "--sources", sources)[2]
 

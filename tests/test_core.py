@@ -25,6 +25,8 @@ RECIPROCAL, MIRRORED = (
 FIELDS = [[0, 30, 180], [0, 1, 1], [[0, 180], [0, 180]], [[0, 90], [0]], [-1, 2], [[0, 1], [0, 1]], False, False]
 NODES = 8
 BITS = [np.zeros(NODES, np.uint16), np.ones(NODES, np.uint16)]
+PRIOR = [[0.1] * 10] * 3, [0.1] * 3
+KNOWING = _core.NodePalette(*FIELDS, prior=PRIOR)
 EQUATIONS = [
     np.arange(NODES + 1, dtype=np.int32),
     np.arange(NODES, dtype=np.int32),
@@ -85,6 +87,9 @@ CALLS = {
     "decode": (_core.NodePalette.decode, [whole(MADE), True, False, 2, "portable"]),
     "decode-mirrored": (_core.NodePalette.decode, [whole(FOLDED), False, True, 2, None]),
     "decode-1": (_core.NodePalette.decode, [whole(MADE, 1), True, False, 1, None]),
+    "prior": (lambda *prior: _core.NodePalette(*FIELDS, prior=prior), list(PRIOR)),
+    "learnt": (lambda *bits: _core.NodePalette(*FIELDS).learnt(*bits), BITS),
+    "decode-part": (KNOWING.decode_part, [KNOWING.encode(*BITS), "portable"]),
     "sweep": (swept, SWEEP),
     "line-errors": (_core.line_errors, [5, RNG.random((35, 3)), RNG.random(35), "portable", 2]),
     "equations": (equations, EQUATIONS),

@@ -4,7 +4,10 @@
 mod golden;
 
 use crate::range_coder::{BitCounter, Coder, Context, Decoder, Encoder, FRESH};
-use crate::{CompactMaterial, Error, InstructionSet, Layout, NodeLattice, Palette, decode, encode, measure};
+use crate::{
+    CompactMaterial, Error, InstructionSet, Layout, NodeLattice, Palette, Prior, decode, decode_part, encode,
+    encode_part, learnt, measure,
+};
 
 const SET: InstructionSet = InstructionSet::PORTABLE;
 const RECIPROCAL: Layout = Layout::Second { reciprocal: true, mirrored: false };
@@ -343,4 +346,44 @@ fn numbers_of_either_sign() {
     assert!(reads_back(&numbers, &numbers));
     assert!(!reads_back(&numbers, &[&[1], &numbers[1..]].concat()));
     assert!(!reads_back(&numbers, &numbers[..9]));
+}
+
+/// Whether a part is read as the material, with a prior.
+fn reads(part: &[u8], prior: &Prior) -> bool {
+    decode_part(part, &small().lattice, prior, SET) == Ok(small())
+}
+
+#[test]
+fn parts_leave_out_the_lattice_and_begin_with_what_was_learnt() {
+    let prior = learnt(&small(), None).unwrap();
+    let part = encode_part(&small(), &prior, SET).unwrap();
+    assert!(reads(&part, &prior));
+    let other = Prior { levels: prior.levels.map(|level| 9.0 * level), ..prior.clone() };
+    assert!(!reads(&part, &other));
+    for set in InstructionSet::available() {
+        assert_eq!(encode_part(&small(), &prior, set).as_ref(), Ok(&part));
+    }
+    let (head, indices) = measure(&small(), Some(&prior), SET).unwrap();
+    assert!(((head + indices) / 8.0 - part.len() as f64).abs() < 4.0);
+    let whole = encode(&small(), SET).unwrap();
+    assert!(part.len() < whole.len());
+}
+
+#[test]
+fn parts_that_no_encoder_writes_are_refused() {
+    let prior = learnt(&small(), None).unwrap();
+    let part = encode_part(&small(), &prior, SET).unwrap();
+    for length in 0..part.len() {
+        assert!(!reads(&part[..length], &prior));
+    }
+    for after in [&b"\0"[..], b"\x01"] {
+        let found = decode_part(&[&part, after].concat(), &small().lattice, &prior, SET);
+        assert_eq!(found, Err(Error::OtherStream));
+    }
+    let mut broken = small();
+    broken.gain.pop();
+    assert_eq!(encode_part(&broken, &prior, SET), Err(Error::Indices));
+    assert_eq!(learnt(&broken, None), Err(Error::Indices));
+    let lattice = NodeLattice { theta_h: vec![1, 180], ..small().lattice };
+    assert_eq!(decode_part(&part, &lattice, &prior, SET), Err(Error::Lattice));
 }
