@@ -27,7 +27,8 @@ Array = NDArray[np.float64]
 
 # The measurements below are changes of the final error of nickel (SGD) and irid_flake_paint1 (RGL) in 2,700 bytes.
 
-DIRECTIONS_A_NODE = 12  # at least
+# At least. With 12, files of 32,000 bytes have 0.4 to 1.1 dB less (chm_orange, aurora_white), and take 6 % less time.
+DIRECTIONS_A_NODE = 36
 # Powers of the solid angle and of the cosines in the weights (docs/method.md)
 SOLID_POWER, COSINE_POWER = 0.75, 0.25
 SYMMETRIC = 1e-3  # a source that differs by less (`distance.sidedness`) is mirrored; RGL's files differ by 10⁻⁵ at most
