@@ -21,7 +21,12 @@ from sommerl.compression.compact.effort import DEFAULT
 from sommerl.compression.compact.search import CompactOptions, compress
 from sommerl.render.judge import Judge, score
 
-COLUMNS = "psnr_soft_db", "psnr_lamp_db", "seconds"
+COLUMNS = {
+    "psnr_soft_db": "soft light [dB]",
+    "psnr_lamp_db": "one lamp [dB]",
+    "score": "score [dB]",
+    "seconds": "seconds",
+}
 
 
 def measured(source: Brdf, judge: Judge, effort: int, size: int) -> dict[str, float]:
@@ -35,7 +40,7 @@ def measured(source: Brdf, judge: Judge, effort: int, size: int) -> dict[str, fl
 
 
 def print_row(name: str, row: dict[int, dict[str, float]]) -> None:
-    cells = (f"{one['psnr_soft_db']:.1f}, {one['psnr_lamp_db']:.1f}, {one['seconds']:.1f}" for one in row.values())
+    cells = (", ".join(f"{one[key]:.1f}" for key in COLUMNS) for one in row.values())
     print(f"| {name} |", " | ".join(cells), "|", flush=True)
 
 
