@@ -20,7 +20,7 @@ from sommerl import BrdfTable, TrainOptions, _core, train
 from sommerl.reflectance.distance import table_metrics
 from sommerl.render.compare import compare_on_sphere
 from sommerl.render.environment import default_environment
-from sommerl.reproduction.data import material
+from sommerl.reproduction.data import Data
 
 # material, clusters, epochs
 CASES = (
@@ -62,7 +62,7 @@ def main() -> None:
     print("| material, M, epochs | rule, α | units of one colour | relative error | log error | PSNR object [dB] |")
     print("|---|---|---|---|---|---|")
     for name, clusters, epochs in CASES:
-        table = material(given.data, name).with_interpolation("nearest")
+        table = Data(given.data).table(name).with_interpolation("nearest")
         for rule, alpha in RULES:
             figures: list[tuple[float, float, float]] = []
             found: list[Any] = []

@@ -20,11 +20,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import curves
 from representations import representations, short_name
 
 from sommerl import SommerlError, load
 from sommerl.formats.registry import by_extension, readable
+from sommerl.plots import distortion, save
 from sommerl.reflectance.reciprocal import reciprocal
 from sommerl.render.judge import Judge
 
@@ -133,7 +133,7 @@ def main() -> None:
     if options.json:
         options.json.write_text(json.dumps(finite({"rows": rows, "means": averages}), indent=2))
     if options.output:
-        curves.draw(rows, averages, options.output)
+        save(distortion.drawn(finite(rows), finite(averages)), options.output)
 
 
 if __name__ == "__main__":

@@ -26,12 +26,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sommerl import Brdf, BrdfTable, SommerlError, compress, load
+from sommerl import Brdf, BrdfTable, SommerlError, TrainOptions, compress, load, train
 from sommerl.formats.names import split_member
 from sommerl.reflectance.cells import MERL
 from sommerl.reflectance.half_diff import directions
 from sommerl.render.metrics import psnr, to_srgb
-from sommerl.reproduction.data import RULES, compressed
+from sommerl.reproduction.data import RULES
 
 PHI_D = 90  # the bin
 ABOVE = MERL.above_horizon[:, :, PHI_D]
@@ -60,7 +60,7 @@ def representations(source: Brdf, sizes: Sequence[int]) -> Iterator[tuple[str, B
     """What is made from a material, each with what it is called. sizes: of compact files, in bytes."""
     table = BrdfTable.of(source)
     for title, rule in RULES.items():
-        material = compressed(table, CLUSTERS, EPOCHS, **rule)
+        material = train(table, TrainOptions(clusters=CLUSTERS, epochs=EPOCHS, **rule))[0]
         for interpolation in ("nearest", "trilinear"):
             yield f"paper, {title}, {interpolation}", material.with_interpolation(interpolation)
     for size in sizes:

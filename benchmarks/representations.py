@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import kmeans
-from model_fits import GGX_PARAMETERS, SGD_PARAMETERS, fitted_ggx, fitted_sgd
 
 import sommerl
 from sommerl import Brdf, BrdfTable
@@ -20,6 +19,7 @@ from sommerl.formats import merl, nbrdf
 from sommerl.models.nbrdf import WEIGHTS
 from sommerl.reflectance.reciprocal import reciprocal
 from sommerl.render.judge import Judge, score
+from sommerl.reproduction.model_fits import GGX_PARAMETERS, SGD_PARAMETERS, fitted_ggx, fitted_sgd
 
 PALETTES = (256, 1000)  # of k-means
 NUMBER = 4  # bytes: float32

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import base64
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from helpers import tool
+from numpy.typing import NDArray
 from playwright.sync_api import Browser, Error, Page, Playwright, sync_playwright
 
 # Pictures are drawn by the processor, the same on every machine: by WebGL2, or, with more options, by WebGPU.
@@ -92,6 +95,17 @@ def browse(chromium: Browser, tmp_path: Path) -> Iterator[Browse]:
     ready: an expression of JavaScript that becomes true. first: a script that runs before those of the page. Each page
     has a profile of its own. A test fails at its end if one of them was not quiet.
     """
+    yield from _browsing(chromium, tmp_path)
+
+
+@pytest.fixture(scope="module")
+def browse_for_all(chromium: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browse]:
+    """The same for pages that a module's tests ask and do not change: to open one takes seconds. They are to be quiet
+    until the module's end."""
+    yield from _browsing(chromium, tmp_path_factory.mktemp("pages"))
+
+
+def _browsing(chromium: Browser, folder: Path) -> Iterator[Browse]:
     contexts: list[Any] = []
     noises: list[Noise] = []
 
@@ -103,7 +117,7 @@ def browse(chromium: Browser, tmp_path: Path) -> Iterator[Browse]:
         context.add_init_script(first)
         page = context.new_page()
         page.set_default_timeout(PATIENCE)
-        address = _address(shown, tmp_path, len(contexts))
+        address = _address(shown, folder, len(contexts))
         noise = Noise()
         noises.append(noise)
         noise.listen(page, address.partition("#")[0])
@@ -116,6 +130,22 @@ def browse(chromium: Browser, tmp_path: Path) -> Iterator[Browse]:
         context.close()
     for noise in noises:
         check_quiet(noise)
+
+
+_AS_TEXT = """
+async (given) => {
+    const bytes = new Uint8Array(Float64Array.from(await (EXPRESSION)(given)).buffer);
+    const parts = [];
+    for (let i = 0; i < bytes.length; i += 2 ** 15) parts.push(String.fromCharCode(...bytes.subarray(i, i + 2 ** 15)));
+    return btoa(parts.join(""));
+}
+"""
+
+
+def numbers(page: Page, function: str, given: Any = None) -> NDArray[np.float64]:
+    """The numbers that a function of JavaScript returns or promises. They come as text: one by one, as Playwright hands
+    over arrays, many take seconds."""
+    return np.frombuffer(base64.b64decode(page.evaluate(_AS_TEXT.replace("EXPRESSION", function), given)))
 
 
 _GO = """

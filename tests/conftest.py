@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from browser import browse, chromium, chromium_with_webgpu, playwright  # noqa: F401 - fixtures
+from browser import browse, browse_for_all, chromium, chromium_with_webgpu, playwright  # noqa: F401 - fixtures
 from helpers import SMALL
 
 from sommerl import BrdfTable

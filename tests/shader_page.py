@@ -1,14 +1,22 @@
 """A page of materials whose shaders are asked for what they calculate."""
 
+import base64
 from contextlib import contextmanager
 
 import numpy as np
-from browser import READY, Noise, check_quiet, wait_until
+from browser import READY, Noise, check_quiet, numbers, wait_until
 
 from sommerl.viewer.held import held
 from sommerl.viewer.page import page
 
 INTERPOLATED = 1e-2  # the relative difference that a shader may have
+# Directions go as text, as numbers come back: see `numbers`.
+ASK = """
+([number, wi, wo, what]) => {
+    const read = (text) => [...new Float32Array(Uint8Array.from(atob(text), (one) => one.charCodeAt(0)).buffer)];
+    return sommerl.evaluate(number, read(wi), read(wo), what);
+}
+"""
 
 
 @contextmanager
@@ -25,9 +33,8 @@ def shaders(chromium, folder, materials, device="webgl"):
     assert shown.evaluate("sommerl.picture.device.kind") == {"webgl": "WebGL2", "webgpu": "WebGPU"}[device]
 
     def ask(name, pairs, what="brdf"):
-        given = [names.index(name), *(w.reshape(-1).tolist() for w in pairs), what]
-        found = shown.evaluate("(given) => window.sommerl.evaluate(...given)", given)
-        return np.array(found, float).reshape(-1, 3)
+        wi, wo = (base64.b64encode(w.astype("<f4").tobytes()).decode() for w in pairs)
+        return numbers(shown, ASK, [names.index(name), wi, wo, what]).reshape(-1, 3)
 
     yield ask
     context.close()

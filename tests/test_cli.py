@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -180,6 +181,7 @@ def test_demo(capsys, tmp_path, monkeypatch):
     from sommerl.commands import demo
 
     monkeypatch.setattr(demo, "TrainOptions", lambda: sommerl.TrainOptions(clusters=4, epochs=1))
+    monkeypatch.setattr(demo, "compare_on_sphere", partial(demo.compare_on_sphere, size=32, spp=8))
     result = run_json(capsys, "demo", "--out", tmp_path / "demo")
     assert result.keys() >= COMPRESS_KEYS | IMAGE_KEYS
     for path in result["output"].values():

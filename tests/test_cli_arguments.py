@@ -134,7 +134,7 @@ NAMED = [
     ("fit nickel --model lambertian --lobes 2", "--lobes: lambertian is a base itself and has 1 lobe, found 2"),
     ("fit nickel --model wadr", "--model: expected lambertian, "),
     ("factor nickel -o x.fbrdf --terms 0", "--terms: expected 1 to 32"),
-    ("paper table1 --samples 1", "--samples: expected 1000 to"),
+    ("paper fig5 --only sphere", "--only: expected a part of fig5, found sphere; did you mean spheres?"),
     ("compare nickel chrome --spp 0", "--spp: expected 1 to"),
     ("render nickel -o x.png --size 1", "--size: expected 8 to"),
     ("render nickel -o x.png --threads 0", "--threads: expected 1 to"),
@@ -175,7 +175,7 @@ MISTYPED = [
     ("compress nickel -o x.smrl --target-size 8GB", "--target-size: expected a number of bytes, like 8000 or 8kB", ""),
     ("compress nickel -o x.smrl --target-size 900 --target-psnr 40", "--target-psnr: not allowed beside", "-size"),
     ("compress nickel -o x.smrl --clusters", "--clusters: expected one argument", ""),
-    ("paper tabel1", "ITEM: expected table1 or fig5 or fig6 or all, found tabel1", "did you mean table1?"),
+    ("paper tabel1", "ITEM: expected fig1 or fig2 or fig3 or ", "did you mean table1?"),
     ("compare nickel chrome more", "more: expected no further argument", ""),
     ("convert nickel", "the following arguments are required: OUT", ""),
 ]  # fmt: skip

@@ -34,7 +34,7 @@ LINES = {
     "compress --target": ["--target-size", "--target-psnr"],
     "compress --rule ": ["paper", "kohonen"],
     "render --scene s": ["sphere", "statue", "sample", "still-life"],
-    "paper ": ["table1", "fig5", "fig6", "all"],
+    "paper t": ["table1", "table2"],
     "info ni": ["nix.smrl", "ninth"],
     "compress x -o ni": ["nix.smrl", "ninth"],
     "compare x ni": ["nix.smrl", "ninth"],

@@ -11,7 +11,7 @@ from helpers import SMALL, compact_material, complaint, lambertian_table, must_f
 from sampled import NODES
 
 from sommerl import MERL, BrdfTable, TrainOptions, builtin, train
-from sommerl.commands import paper as report
+from sommerl.commands import paper
 from sommerl.commands.demo import write_page
 from sommerl.compression.smrl import file as smrl
 from sommerl.factored import file as fbrdf
@@ -21,7 +21,10 @@ from sommerl.formats.shader import source as shader
 from sommerl.formats.shader.language import LANGUAGES
 from sommerl.plots import lobes, page
 from sommerl.render.images import write_image
-from sommerl.reproduction.tables import FitRow, ImageRow
+from sommerl.reproduction import report, section
+from sommerl.reproduction.cells import Setting, Store
+from sommerl.reproduction.data import Data
+from sommerl.reproduction.items import ITEMS
 from sommerl.system.errors import OptionError
 from sommerl.system.files import atomic_write, check_writable, replacing_files
 
@@ -114,9 +117,14 @@ def written_by_all(folder):
         figure = page.matplotlib().Figure()
         lobes(figure.add_subplot(projection="polar"), builtin("nickel"))
         page.save(figure, folder / f"plot{extension}")
-    report._write(folder / "table1.csv", [vars(FitRow("nickel", "ward", 1, 1, 1, 1, 1))])
-    report._write(folder / "fig5.csv", [vars(ImageRow("ward", 1, 1, 1))])
-    return sorted(folder.iterdir())
+    setting = Setting(Data())
+    cell = ITEMS["fig3"].plan(setting)[0]
+    outcome = cell.work(setting)
+    Store(folder).save(cell, "key", outcome)
+    files = [folder / f"report.{extension}" for extension in ("html", "md", "json")]
+    paper._write(folder, files, report.made(["fig3"], setting, {cell.name: outcome}, "sommerl paper"))
+    (folder / "x.webp").write_bytes(section.webp((255 * pixels).astype("u1")))
+    return sorted(path for path in folder.rglob("*") if path.is_file())
 
 
 def check_kept(path):

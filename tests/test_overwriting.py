@@ -35,7 +35,8 @@ COMMANDS = {
     ),
     "render a scene": (["render", "{}/in/scene.xml", "-o", "{}/x.exr"], ["x.exr"]),
     "plot": (["plot", "nickel", "-o", "{}/x.pdf"], ["x.pdf"]),
-    "paper": (["paper", "-o", "{}"], ["table1.csv", "fig5.csv", "fig5.png", "fig6.csv", "fig6.png"]),
+    "paper": (["paper", "-o", "{}"], ["report.html", "report.md", "report.json"]),
+    "paper, one item": (["paper", "fig3", "-o", "{}"], ["fig3.html", "fig3.md", "fig3.json"]),
 }
 CASES = [(command, output) for command, (_, outputs) in COMMANDS.items() for output in outputs]
 
@@ -78,6 +79,7 @@ QUICK = {
     "library pack": [],
     "library sheet": [],
     "convert samples": ["--overwrite"],  # of a MERL table, there is no telling who wrote it
+    "paper, one item": [],
     "render": [],
     "render to EXR": [],
 }

@@ -5,7 +5,7 @@ import multiprocessing
 import os
 import signal
 import socket
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 
 import pytest
 from helpers import must_fail
@@ -17,10 +17,11 @@ from sommerl.system.errors import MaterialError
 SPAWN = multiprocessing.get_context("spawn")
 
 
-def hold(folder, shard, ready, rest):
+def hold(folder, shard, pipe):
     with locked(folder, shard, print):
-        ready.set()
-        rest.wait()
+        pipe.send("ready")
+        with suppress(EOFError):
+            pipe.recv()
 
 
 @pytest.fixture
@@ -31,17 +32,20 @@ def folder(tmp_path):
 
 @pytest.fixture
 def holder(folder):
-    """Starts a process that holds a lock until it is killed, or told to end."""
+    """Starts a process that holds a lock until it is killed, or the pipe to it is closed. An event would not do: to set
+    one is to wait for whoever sleeps at it, and a process that was killed in its sleep never answers."""
     with ExitStack() as stack:
 
         def start(shard):
-            ready, rest = SPAWN.Event(), SPAWN.Event()
-            process = SPAWN.Process(target=hold, args=(folder, shard, ready, rest))
+            pipe, other_end = SPAWN.Pipe()
+            process = SPAWN.Process(target=hold, args=(folder, shard, other_end))
             process.start()
             stack.callback(process.join)
-            stack.callback(rest.set)
-            assert ready.wait(60)
-            return process, rest
+            stack.callback(pipe.close)
+            other_end.close()
+            assert pipe.poll(60)
+            assert pipe.recv() == "ready"
+            return process, pipe
 
         yield start
 
@@ -69,7 +73,7 @@ def test_who_is_at_work_is_named_and_the_dead_are_not_waited_for(folder, holder)
 
 
 def test_shards_work_side_by_side(folder, holder):
-    process, rest = holder(Shard(2, 4))
+    process, pipe = holder(Shard(2, 4))
     named = f"process {process.pid} on {socket.gethostname()} at work with shard 2/4"
     sentence = f"{folder}: expected no other build in it, found {named}; wait for it, or stop it"
     for other in (WHOLE, Shard(2, 4), Shard(1, 2), Shard(1, 3), Shard(5, 16)):
@@ -78,7 +82,7 @@ def test_shards_work_side_by_side(folder, holder):
         with locked(folder, other, print) as ours:
             assert not ours.widened()
     must_fail(check_refused, folder, Shard(1, 4), sentence)
-    rest.set()
+    pipe.close()
     process.join()
     with locked(folder, Shard(1, 4), print) as ours:
         assert ours.widened()
@@ -103,7 +107,7 @@ def test_a_dead_owner_s_lock_is_taken_by_one_alone(folder, holder):
     process, _ = holder(WHOLE)
     os.kill(process.pid, signal.SIGKILL)
     process.join()
-    start, results = SPAWN.Barrier(3), SPAWN.Queue()
+    start, results = SPAWN.Barrier(3, timeout=60), SPAWN.Queue()
     racers = [SPAWN.Process(target=race, args=(folder, start, results)) for _ in range(3)]
     for racer in racers:
         racer.start()

@@ -7,7 +7,7 @@ from pathlib import Path
 import flip_evaluator
 import numpy as np
 import pytest
-from browser import go, wait_until
+from browser import go, numbers, wait_until
 from helpers import must_fail
 from PIL import Image
 from scipy.spatial import cKDTree
@@ -34,18 +34,27 @@ def materials():
     return [load(GOLD), builtin("purple-paint")]
 
 
-def opened(browse, materials, fragment=""):
-    html = page([held(brdf, f"{brdf.name} {i}") for i, brdf in enumerate(materials)])
-    shown = browse(html, viewport={"width": 400, "height": 600})
-    if fragment:
-        go(shown, fragment)
+@pytest.fixture(scope="module")
+def html(materials):
+    return page([held(brdf, f"{brdf.name} {i}") for i, brdf in enumerate(materials)])
+
+
+@pytest.fixture(scope="module")
+def asked(browse_for_all, html):
+    """A page that is asked for pictures of any size. Its own is small, since it is drawn all the while."""
+    return browse_for_all(html, viewport={"width": 400, "height": 150})
+
+
+def opened(browse, html, fragment):
+    shown = browse(html, viewport={"width": 400, "height": 400})
+    go(shown, fragment)
     return shown
 
 
 def radiance(shown, number, paths, *, size=SIZE, bounces=1, **state):
     """Radiance (size, size, 3) and coverage (size, size)."""
-    found = shown.evaluate("given => sommerl.radiance(...given)", [number, state, size, size, paths, bounces])
-    pixels = np.array(found).reshape(size, size, 4)[::-1]
+    given = [number, state, size, size, paths, bounces]
+    pixels = numbers(shown, "given => sommerl.radiance(...given)", given).reshape(size, size, 4)[::-1]
     return pixels[..., :3], pixels[..., 3]
 
 
@@ -83,21 +92,19 @@ def check_alike(found, expected, mask, least):
 
 @pytest.mark.parametrize("number", [0, 1])
 @pytest.mark.parametrize(("light", "azimuth", "elevation"), [((-35, 40), 0, 0), ((70, 10), 25, 50)])
-def test_a_sphere_under_a_lamp(browse, materials, number, light, azimuth, elevation):
-    shown = opened(browse, materials)
+def test_a_sphere_under_a_lamp(asked, materials, number, light, azimuth, elevation):
     state = {"scene": "sphere", "environment": False, "azimuth": azimuth, "elevation": elevation}
-    found, covered = radiance(shown, number, 1, light=light, **state)
+    found, covered = radiance(asked, number, 1, light=light, **state)
     expected, mask = sphere(materials[number], light, azimuth, elevation)
     assert (mask != (covered > 0)).sum() <= 2  # of which single precision may think otherwise
     check_alike(found, expected, mask & (covered > 0), 45)
-    elsewhere, _ = radiance(shown, number, 1, light=[light[0] + 4, light[1]], **state)
+    elsewhere, _ = radiance(asked, number, 1, light=[light[0] + 4, light[1]], **state)
     must_fail(check_alike, elsewhere, expected, mask & (covered > 0), 45)
 
 
 @pytest.mark.parametrize("number", [0, 1])
-def test_a_sphere_in_the_environment(browse, materials, number):
-    shown = opened(browse, materials)
-    found, _ = radiance(shown, number, 600, size=64, scene="sphere", environment=True)
+def test_a_sphere_in_the_environment(asked, materials, number):
+    found, _ = radiance(asked, number, 600, size=64, scene="sphere", environment=True)
     scene = make_scene("sphere", [materials[number]], environment=default_environment(), size=64)
     (expected,) = render_all([lambda: scene], spp=1024, seed=0)
     check_alike(found, expected.pixels, expected.mask, 38)
@@ -107,7 +114,7 @@ def test_a_sphere_in_the_environment(browse, materials, number):
 TRIANGLES = """
 async (scene) => {
     await sommerl.store.mesh(scene);
-    return [...sommerl.store.meshes.get(scene).triangles];
+    return sommerl.store.meshes.get(scene).triangles;
 }
 """
 ALL = 7  # bounces after the first surface, as `sommerl render` has them
@@ -115,9 +122,7 @@ ALL = 7  # bounces after the first surface, as `sommerl render` has them
 
 def mesh_of(shown, scene):
     """The page's own triangles: it has coarser ones than Python."""
-    corner, one, other, *normals = np.moveaxis(
-        np.array(shown.evaluate(TRIANGLES, scene)).reshape(-1, 6, 4)[..., :3], 1, 0
-    )
+    corner, one, other, *normals = np.moveaxis(numbers(shown, TRIANGLES, scene).reshape(-1, 6, 4)[..., :3], 1, 0)
     positions = np.stack([corner, corner + one, corner + other], axis=1).reshape(-1, 3)
     faces = np.arange(len(positions)).reshape(-1, 3)
     return Mesh(
@@ -126,16 +131,15 @@ def mesh_of(shown, scene):
 
 
 @pytest.mark.parametrize(("scene", "environment"), [("statue", False), ("ball", True), ("sample", False)])
-def test_the_other_scenes(browse, materials, scene, environment):
-    shown = opened(browse, materials)
+def test_the_other_scenes(asked, materials, scene, environment):
     lamp = DirectionalLight(40, 50)
     light = default_environment() if environment else lamp
-    mesh = None if scene == "sample" else mesh_of(shown, scene)
+    mesh = None if scene == "sample" else mesh_of(asked, scene)
     name = "sample" if scene == "sample" else "statue"  # which stands as the ball does
     made = make_scene(name, [materials[0]], environment=light, mesh=mesh, view=Viewpoint(20, 25, 1.1), size=64)
     (expected,) = render_all([lambda: made], spp=256, seed=0)
     state = {"scene": scene, "environment": environment, "azimuth": 20, "elevation": 25, "zoom": 1.1}
-    found, covered = radiance(shown, 0, 96, size=64, bounces=ALL, light=[40, 50], **state)
+    found, covered = radiance(asked, 0, 96, size=64, bounces=ALL, light=[40, 50], **state)
     least = 28 if environment else 32  # of which noise and edges take most
 
     def check(found, covered):
@@ -148,11 +152,10 @@ def test_the_other_scenes(browse, materials, scene, environment):
     must_fail(check, np.roll(found, 2, axis=0), covered)
 
 
-def test_pythons_meshes_are_the_pages(browse, materials):
+def test_pythons_meshes_are_the_pages(asked):
     """The page's vertices lie on Python's surfaces, within the error of both."""
-    shown = opened(browse, materials)
     for scene, made in (("statue", finial().standing()), ("ball", material_ball())):
-        mesh = mesh_of(shown, scene)
+        mesh = mesh_of(asked, scene)
 
         def check(positions, made=made):
             away, _ = cKDTree(made.positions).query(positions)
@@ -165,28 +168,27 @@ def test_pythons_meshes_are_the_pages(browse, materials):
 READ = """
 async () => {
     const { picture, state } = sommerl;
-    const read = async (one) => [...(await picture.device.pixels(one))];
-    const figures = await picture.figures(state);
-    const pictures = await Promise.all(picture.shown.map(read));
-    const size = [picture.shown[0].height, picture.shown[0].width];
-    return { pictures, map: await read(picture.map), figures, size };
+    const { psnr, flip } = await picture.figures(state);
+    const read = await Promise.all([...picture.shown, picture.map].map((one) => picture.device.pixels(one)));
+    const [{ height, width }] = picture.shown;
+    return [height, width, psnr.object, psnr.frame, flip, ...read.flatMap((pixels) => [...pixels])];
 }
 """
 
 
-def test_figures(browse, materials):
+def test_figures(browse, html):
     """PSNR is Python's, and FLIP that of its authors."""
-    shown = opened(browse, materials, "a=0&b=1&view=flip")
+    shown = opened(browse, html, "a=0&b=1&view=flip")
     wait_until(shown, "sommerl.picture.count >= 2 && sommerl.picture.films.length > 1")
-    found = shown.evaluate(READ)
-    height, width = found["size"]
-    a, b = (np.array(one, np.uint8).reshape(height, width, 4)[::-1] for one in found["pictures"])
+    height, width, in_object, in_frame, flip, *_ = found = numbers(shown, READ)
+    *pictures, drawn = found[5:].reshape(3, int(height), int(width), 4)[:, ::-1]
+    a, b = (one.astype(np.uint8) for one in pictures)
     mask = a[..., 3] >= 128
     pair = [one[..., :3] for one in (a, b)]
     expected, mean, _ = flip_evaluator.evaluate(
         *(one.astype(np.float32) / 255 for one in pair), "LDR", applyMagma=False
     )
-    drawn = np.array(found["map"]).reshape(height, width, 4)[::-1, :, 0]
+    drawn = drawn[..., 0]
     assert mean > 0.01
 
     def check(drawn):
@@ -194,26 +196,28 @@ def test_figures(browse, materials):
 
     check(drawn)
     must_fail(check, drawn[:, ::-1])
-    figures = found["figures"]
-    assert figures["psnr"]["object"] == pytest.approx(psnr(*(one[mask] for one in pair)), abs=1e-6)
-    assert figures["psnr"]["frame"] == pytest.approx(psnr(*pair), abs=1e-6)
-    assert figures["flip"] == pytest.approx(drawn[mask].mean(), abs=1e-6)
+    assert in_object == pytest.approx(psnr(*(one[mask] for one in pair)), abs=1e-6)
+    assert in_frame == pytest.approx(psnr(*pair), abs=1e-6)
+    assert flip == pytest.approx(drawn[mask].mean(), abs=1e-6)
 
 
-def test_what_is_saved_is_what_is_shown(browse, materials):
+def test_what_is_saved_is_what_is_shown(browse, html):
     """In A's picture exposed as `sommerl render` exposes, the object's 90th percentile is 0.6 linear."""
-    shown = opened(browse, materials, "view=a")
+    shown = opened(browse, html, "view=a")
     wait_until(shown, "sommerl.picture.count === 16 && sommerl.picture.canvas.width > 300")
     # At once: between two calls, the page might have begun another picture.
-    data, linear, shown_scale = shown.evaluate(
+    shown_scale, *_ = found = numbers(
+        shown,
         """async () => {
             sommerl.picture.show(sommerl.state);
             const { scale } = sommerl.state;
-            return [sommerl.canvas.toDataURL(), await sommerl.onCanvas(), scale];
-        }"""
+            window.saved = sommerl.canvas.toDataURL();
+            return [scale, ...(await sommerl.onCanvas())];
+        }""",
     )
+    data, linear = shown.evaluate("saved"), found[1:]
     pixels = np.array(Image.open(io.BytesIO(base64.b64decode(data.partition(",")[2]))).convert("RGB"))
-    linear = np.array(linear).reshape(*pixels.shape[:2], 4)[::-1]
+    linear = linear.reshape(*pixels.shape[:2], 4)[::-1]
     mask = linear[..., 3] >= 0.5
     scale = exposure(linear[..., :3], mask)
     assert shown_scale == pytest.approx(scale, rel=0.01)

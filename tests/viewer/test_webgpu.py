@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import READY, Noise, check_quiet, wait_until
+from browser import READY, Noise, check_quiet, numbers, wait_until
 from helpers import must_fail
 from PIL import Image
 
@@ -61,6 +61,10 @@ def asked(both, script, *given):
     return [one.evaluate(script, list(given)) for one in both]
 
 
+def numbers_asked(both, script, *given):
+    return [numbers(one, script, list(given)) for one in both]
+
+
 def check_alike(found, expected, least=LEAST):
     assert psnr(expected, found) >= least
 
@@ -80,7 +84,7 @@ SCENES = {
 def test_pictures_are_those_of_webgl2(both, name):
     number, paths, state = SCENES[name]
     given = [number, {"light": [40, 50], **state}, paths]
-    found, expected = (np.array(one).reshape(48, 48, 4) for one in asked(both, RADIANCE, *given))
+    found, expected = (one.reshape(48, 48, 4) for one in numbers_asked(both, RADIANCE, *given))
     scale = exposure(expected[..., :3], expected[..., 3] >= 0.5)
     found, expected = (to_srgb8(one[..., :3] * scale) for one in (found, expected))
     check_alike(found, expected)
@@ -141,7 +145,7 @@ def test_directions_and_entries_are_those_of_webgl2(both, number, what):
     wo /= np.linalg.norm(wo, axis=1, keepdims=True)
     wi = rng.random((1000, 3)) if what == "sample" else np.roll(wo, 1, axis=0)
     given = [number, wi.ravel().tolist(), wo.ravel().tolist(), what]
-    found, expected = (np.array(one).reshape(-1, 3) for one in asked(both, DRAWN, *given))
+    found, expected = (one.reshape(-1, 3) for one in numbers_asked(both, DRAWN, *given))
     assert np.isfinite(found).all()
     check_mostly_equal(found, expected)
     if (number, what) != (1, "entries"):  # a table has none
@@ -155,7 +159,7 @@ async ([wi, wo]) => {
     sommerl.change({ view: "a", scene: "sphere", light: [20, 40] });
     sommerl.highlight({ material: 0, shape });
     while (!picture.used || loop.resolution < 1 || loop.anew) await new Promise((next) => setTimeout(next, 20));
-    const found = [...(await picture.device.pixels(picture.used))];
+    const found = await picture.device.pixels(picture.used);
     sommerl.highlight(null);
     return found;
 }
@@ -163,7 +167,7 @@ async ([wi, wo]) => {
 
 
 def test_the_pixels_of_an_entry_are_those_of_webgl2(both):
-    found, expected = (np.array(one).reshape(-1, 4) for one in asked(both, MARKED, [0.1, 0.2, 0.9], [0.2, -0.1, 0.9]))
+    found, expected = (one.reshape(-1, 4) for one in numbers_asked(both, MARKED, [0.1, 0.2, 0.9], [0.2, -0.1, 0.9]))
     assert 50 < (expected[:, 0] == 255).sum() < 0.9 * len(expected)
     check_mostly_equal(found, expected)
     must_fail(check_mostly_equal, np.roll(found, 5, axis=0), expected)

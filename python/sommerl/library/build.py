@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import errno
 import hashlib
-from collections import deque
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import BrokenExecutor
 from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass, field
 from functools import cache
@@ -23,7 +22,7 @@ from ..system import door
 from ..system.errors import FormatError, MaterialError, SommerlError, unexpected
 from ..system.files import atomic_write, remove_all_left_over
 from . import index
-from .engines import Engine
+from .engines import Engine, results
 from .lock import WHOLE, Shard, locked
 from .record import Record
 from .sources import Material, Sources, content, find
@@ -162,8 +161,8 @@ def _make(
     folder: Path, wanted: Sequence[Material], method: Method, engine: Engine, report: Report, hooks: Hooks
 ) -> None:
     of_job = {Job(each.path, each.parts, method): each for each in wanted}
-    with hooks.progress(f"building {folder}") as advance, closing(_results(list(of_job), engine)) as results:
-        for done, (job, result) in enumerate(results):
+    with hooks.progress(f"building {folder}") as advance, closing(results(work, list(of_job), engine)) as found:
+        for done, (job, result) in enumerate(found):
             material = of_job[job]
             sentence = _sentence(material.path, result) if isinstance(result, BaseException) else ""
             if isinstance(result, Made):
@@ -178,50 +177,6 @@ def _make(
                 hooks.failed(sentence)
             if advance:
                 advance(done + 1, len(wanted))
-
-
-def _results(jobs: Sequence[Job], engine: Engine) -> Generator[tuple[Job, Made | BaseException]]:
-    """What comes of each job, in the order in which they end.
-
-    If a process dies, its job is not known: all that were begun are done once more, one by one, so that the one that
-    it died of is told from the others. Raises MaterialError if a cluster gives up.
-    """
-    waiting, suspects = deque(jobs), deque[Job]()
-    while waiting or suspects:
-        alone = not waiting
-        queue = deque([suspects.popleft()]) if alone else waiting
-        with engine.open() as executor:
-            for job, result in _until_broken(executor, queue, engine.at_once):
-                if isinstance(result, BrokenExecutor) and not alone:
-                    suspects.append(job)
-                else:
-                    yield job, result
-
-
-def _until_broken(
-    executor: Executor, queue: deque[Job], at_once: int | None
-) -> Iterator[tuple[Job, Made | BaseException]]:
-    """Takes jobs from a queue, and gives what comes of them, until the queue is empty or the executor is broken."""
-    begun: dict[Future[Made], Job] = {}
-    broken = False
-    while begun or (queue and not broken):
-        while queue and not broken and (at_once is None or len(begun) < at_once):
-            try:
-                begun[executor.submit(work, queue[0])] = queue[0]
-                queue.popleft()
-            except BrokenExecutor as error:
-                broken = True
-                if not begun:
-                    yield queue.popleft(), error
-        for future in wait(begun, return_when=FIRST_COMPLETED).done:
-            job = begun.pop(future)
-            try:
-                yield job, future.result()
-            except CancelledError as error:
-                raise MaterialError("cluster: expected it to go on, found its work cancelled; run again") from error
-            except Exception as error:
-                broken = broken or isinstance(error, BrokenExecutor)
-                yield job, error
 
 
 def _sentence(source: str, error: BaseException) -> str:

@@ -8,17 +8,29 @@ import os
 import signal
 import threading
 import warnings
-from collections.abc import Callable, Generator, Mapping
-from concurrent.futures import Executor, ProcessPoolExecutor
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, TypeVar
 
 from ..system import threads
-from ..system.errors import OptionError
+from ..system.errors import MaterialError, OptionError
 from ..system.interrupt import hold_interrupts
 from ..system.optional import optional
+
+J = TypeVar("J")  #: a job
+R = TypeVar("R")  #: what comes of it
 
 # Python has a process that clears up after others; it would complain of a build that was killed.
 QUIET = "ignore::UserWarning:multiprocessing.resource_tracker"
@@ -47,6 +59,50 @@ def processes(count: int) -> Engine:
 def cluster(address: str, warn: Callable[[str], None]) -> Engine:
     """Dask's distributed scheduler at an address. warn: is told if it has no workers."""
     return Engine(lambda: _cluster(address, warn), None)
+
+
+def results(work: Callable[[J], R], jobs: Sequence[J], engine: Engine) -> Generator[tuple[J, R | BaseException]]:
+    """What comes of each job, in the order in which they end.
+
+    If a process dies, its job is not known: all that were begun are done once more, one by one, so that the one that
+    it died of is told from the others. Raises MaterialError if a cluster gives up.
+    """
+    waiting, suspects = deque(jobs), deque[J]()
+    while waiting or suspects:
+        alone = not waiting
+        queue = deque([suspects.popleft()]) if alone else waiting
+        with engine.open() as executor:
+            for job, result in _until_broken(executor, work, queue, engine.at_once):
+                if isinstance(result, BrokenExecutor) and not alone:
+                    suspects.append(job)
+                else:
+                    yield job, result
+
+
+def _until_broken(
+    executor: Executor, work: Callable[[J], R], queue: deque[J], at_once: int | None
+) -> Iterator[tuple[J, R | BaseException]]:
+    """Takes jobs from a queue, and gives what comes of them, until the queue is empty or the executor is broken."""
+    begun: dict[Future[R], J] = {}
+    broken = False
+    while begun or (queue and not broken):
+        while queue and not broken and (at_once is None or len(begun) < at_once):
+            try:
+                begun[executor.submit(work, queue[0])] = queue[0]
+                queue.popleft()
+            except BrokenExecutor as error:
+                broken = True
+                if not begun:
+                    yield queue.popleft(), error
+        for future in wait(begun, return_when=FIRST_COMPLETED).done:
+            job = begun.pop(future)
+            try:
+                yield job, future.result()
+            except CancelledError as error:
+                raise MaterialError("cluster: expected it to go on, found its work cancelled; run again") from error
+            except Exception as error:
+                broken = broken or isinstance(error, BrokenExecutor)
+                yield job, error
 
 
 @contextmanager

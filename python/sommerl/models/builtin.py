@@ -39,21 +39,27 @@ def builtin(name: str) -> ShiftedGamma:
 def builtin_table(name: str, *, noise: int | None = None, lattice: Lattice = MERL) -> BrdfTable:
     """A built-in material as a table: its formula at the cell centres of a lattice.
 
-    noise: None for no noise, or a seed. The noise has the size that the paper quotes for MERL's measurements
-    (deviations from reciprocity of 10-15 % near normal incidence and 60-70 % at grazing angles). Each cell is
-    multiplied by a log-normal factor, the same for all channels, with mean 1 and σ = 0.12 + 0.5 (1 - cos θ)⁴, where θ
-    is the larger of θ_i and θ_o.
+    noise: None for no noise, or a seed: see `noisy`.
     """
     table = BrdfTable.sampled(builtin(name), lattice)
-    if noise is None:
-        return table
+    return table if noise is None else noisy(table, noise)
+
+
+def noisy(table: BrdfTable, seed: int) -> BrdfTable:
+    """A table with noise of the size that the paper quotes for MERL's measurements (deviations from reciprocity of
+    10-15 % near normal incidence and 60-70 % at grazing angles).
+
+    Each cell is multiplied by a log-normal factor, the same for all channels, with mean 1 and σ = 0.12 + 0.5
+    (1 - cos θ)⁴, where θ is the larger of θ_i and θ_o.
+    """
+    lattice = table.lattice
     cosine = np.clip(np.minimum(*lattice.cosines()), 0, 1)
     sigma = 0.12 + 0.5 * (1 - cosine) ** 4
     # Box-Muller on the raw stream of the generator: NumPy's own normal numbers may change between versions.
-    u = (np.random.PCG64(noise).random_raw(2 * lattice.size).reshape(2, *lattice.shape) + 0.5) / 2.0**64
+    u = (np.random.PCG64(seed).random_raw(2 * lattice.size).reshape(2, *lattice.shape) + 0.5) / 2.0**64
     normal = np.sqrt(-2 * np.log(u[0])) * np.cos(2 * np.pi * u[1])
     factor = np.exp(sigma * normal - sigma**2 / 2)
-    return BrdfTable(table.values * factor[..., None], lattice, name=f"{table.name}, noise seed {noise}")
+    return BrdfTable(table.values * factor[..., None], lattice, name=f"{table.name}, noise seed {seed}")
 
 
 # ρ_d, ρ_s, α, p, f0, f1, κ, λ, c, k, θ0, each for r, g, b.

@@ -1,19 +1,31 @@
-"""Finds the paper's materials, and the numbers that the paper prints for them."""
+"""Where the paper's materials come from, and the two ways in which its representation is learnt."""
 
 from __future__ import annotations
 
-import tomllib
+import hashlib
+from dataclasses import dataclass
+from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any, TypedDict, Unpack
+from typing import TypedDict
 
-from ..compression.material import SomManBrdf
-from ..compression.paper.options import Rule, TrainOptions
-from ..compression.paper.train import train
-from ..formats.load import load_table
+from ..compression.paper.options import Rule
+from ..formats.load import load
 from ..formats.registry import extensions, readable
+from ..reflectance.brdf import Brdf
 from ..reflectance.table import BrdfTable
-from ..system.errors import FormatError
+from ..system.errors import FormatError, MaterialError
+
+#: The paper's six, under the database's names.
+NAMES = (
+    "blue-metallic-paint",
+    "yellow-matte-plastic",
+    "purple-paint",
+    "beige-fabric",
+    "green-metallic-paint",
+    "nickel",
+)
+STAND_INS = resources.files("sommerl.reproduction").joinpath("stand_ins")  #: a .smrl file for each of NAMES
 
 
 class Learnt(TypedDict, total=False):
@@ -27,38 +39,77 @@ class Learnt(TypedDict, total=False):
 RULES: dict[str, Learnt] = {"default": {}, "Eq. 2 as printed": {"rule": "paper", "alpha": 0.5}}
 
 
-def expected(item: str) -> dict[str, Any]:
-    """The numbers that the paper prints, from expected.toml. item: "table1", "fig5" or "fig6"."""
-    text = resources.files("sommerl.reproduction").joinpath("expected.toml").read_text("utf-8")
-    return tomllib.loads(text)[item]
+@dataclass(frozen=True)
+class Data:
+    """The materials that the items are made from.
 
-
-def material(data: Path | None, name: str) -> BrdfTable:
-    """A material as a table with trilinear lookup.
-
-    data: a folder that holds a file of that name in any known format, or an archive of materials (.npz); None for the
-    built-in stand-ins. Raises FormatError if there is no such file.
+    source: a folder that holds files of these names in any known format, or an archive of neural BRDFs (.npz); None for
+    the stand-ins that come with the package. called: what captions call them; made up if None.
     """
-    if data is None:
-        source = name
-    elif data.is_file():
-        source = f"{data}:{name}"
-    else:
+
+    source: Path | None = None
+    called: str | None = None
+
+    def place(self, name: str) -> str:
+        """A material as `load` takes it. Raises FormatError if the folder has no such file, MaterialError if there is
+        no stand-in of that name."""
+        if self.source is None:
+            if name not in NAMES:
+                raise MaterialError(f"{name}: expected one of the stand-ins, {', '.join(NAMES)}")
+            return str(STAND_INS / f"{name}.smrl")
+        if self.source.is_file():
+            return f"{self.source}:{name}"
         known = extensions(readable())
-        found = [path for extension in known if (path := data / f"{name}{extension}").is_file()]
-        if not found:
-            raise FormatError(f"{data}: there is no file {name} in it that ends in one of {', '.join(known)}")
-        source = str(found[0])
-    return load_table(source)
+        for extension in known:
+            if (path := self.source / f"{name}{extension}").is_file():
+                return str(path)
+        raise FormatError(f"{self.source}: there is no file {name} in it that ends in one of {', '.join(known)}")
+
+    def brdf(self, name: str) -> Brdf:
+        """A material as its file has it, under that name: captions say what it is."""
+        found = load(self.place(name))
+        found.name = name
+        return found
+
+    def table(self, name: str) -> BrdfTable:
+        """A material as a table with trilinear lookup."""
+        return BrdfTable.of(self.brdf(name)).with_interpolation("trilinear")
+
+    def names(self) -> tuple[str, ...]:
+        """All materials that there are, for the benchmark: the paper's six, and whatever else the folder holds."""
+        if self.source is None or self.source.is_file():
+            return NAMES
+        known = [each for each in extensions(readable()) if each not in (".npz", ".npy", ".json")]
+        found = {path.stem for path in self.source.iterdir() if path.is_file() and path.suffix.lower() in known}
+        return (*(name for name in NAMES if name in found), *sorted(found - set(NAMES)))
+
+    def networks(self) -> tuple[Path, ...]:
+        """Archives of neural BRDFs that the folder holds."""
+        return tuple(sorted(self.source.glob("*.npz"))) if self.source and self.source.is_dir() else ()
+
+    def digest(self, name: str) -> str:
+        """SHA-256 of the file that a material is in."""
+        place = self.place(name)
+        return digest_of(Path(place) if Path(place).is_file() else Path(place.rpartition(":")[0]))
+
+    @property
+    def compressed(self) -> bool:
+        """Whether these materials are compact files themselves, as the stand-ins are that come with the package."""
+        return self.source is None
+
+    @property
+    def caption(self) -> str:
+        """What they are, as captions say it."""
+        if self.called:
+            return self.called
+        if self.source is None:
+            return "built-in NP stand-ins, themselves compressed"
+        kind = "NBRDF stand-ins of" if self.source.is_file() else "the files in"
+        return f"{kind} {self.source.absolute().name}"
 
 
-def described(data: Path | None) -> str:
-    """What the materials in `data` are, as captions say it."""
-    if data is None:
-        return "built-in SGD stand-ins"
-    return f"NBRDF stand-ins of {data.name}" if data.is_file() else f"the files in {data.absolute().name}"
-
-
-def compressed(table: BrdfTable, clusters: int, epochs: int = 30, **rule: Unpack[Learnt]) -> SomManBrdf:
-    """The table, compressed with the preset `paper` and nearest lookup. rule: one of RULES."""
-    return train(table, TrainOptions(clusters=clusters, epochs=epochs, **rule))[0]
+@cache
+def digest_of(path: Path) -> str:
+    """The SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

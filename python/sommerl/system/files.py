@@ -44,10 +44,10 @@ MARKS: tuple[tuple[bytes, bytes], ...] = (
     (b"// ", rb"\A// [^\n]*\n// Written by Sommerl"),
     (b"{", rb'\A\{\s*"sommerl_fits"'),
     (b"{", rb'\A\{\s*"comment": "Written by Sommerl\.'),
-    # CSV has no place for a mark, so the tables of `sommerl paper` are recognised by their column names.
-    (b"material,model,error,error_som_man,error_printed,paper,paper_som_man\n", b""),
-    (b"material,model,error,error_som_man,paper,paper_som_man\n", b""),  # before Eq. 2 as printed stood beside it
-    (b"model,psnr_frame_db,psnr_object_db,paper_db\n", b""),
+    (b"{", rb'\A\{\s*"sommerl_(paper|cell)"'),
+    (b"<!-- ", rb"\A<!-- Written by Sommerl -->"),
+    (b"<svg ", rb"<!-- Written by Sommerl -->"),
+    (b"RIFF", rb"Sommerl"),  # WebP, whose metadata are at its end
 )
 WITHIN = 2**14  # bytes at the beginning and at the end of a file in which its mark is searched for
 # Files of these formats may be measurements, whoever wrote them.

@@ -19,13 +19,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
-from sommerl import Brdf
-from sommerl.fitting import FitOptions, fit
-from sommerl.models.sgd import PARAMETERS, Angles, ShiftedGamma, channel
-from sommerl.reflectance.arrays import split
-from sommerl.reflectance.half_diff import directions
+from ..fitting import FitOptions, fit
+from ..models.sgd import PARAMETERS, Angles, ShiftedGamma, channel
+from ..reflectance.arrays import split
+from ..reflectance.brdf import Brdf
+from ..reflectance.half_diff import directions
+from ..system.optional import optional
 
 Array = NDArray[np.float64]
 Residuals = Callable[[Array, int], Array]  #: for parameters, at every so manieth pair
@@ -85,7 +85,7 @@ def _best(
 
     def search(start: Any, step: int, evaluations: int) -> Any:
         inside = np.clip(start, np.array(low) + 1e-9, np.array(high) - 1e-9)
-        return least_squares(
+        return optional("scipy.optimize", "SciPy", "fits", "fit").least_squares(
             residuals,
             inside,
             bounds=(low, high),
