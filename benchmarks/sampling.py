@@ -3,8 +3,8 @@
     uv run python benchmarks/sampling.py FOLDER/nickel.binary ../shared/data/rgl/*.bsdf [--size 128] [--spp 64]
         [--rounds 8] [--json FILE]
 
-Each material is whatever `sommerl.load` reads, and is taken as it is: a MERL table is looked up trilinearly; an RGL file
-is as it was measured, one-sided and with its negative channels. For each material and sampler:
+Each material is whatever `sommerl.load` reads, and is taken as it is: a MERL table is looked up trilinearly; RGL files
+are as they were measured, one-sided and with negative channels. For each material and sampler:
 
 * variance of the estimate of the albedo at five elevations of the viewer, relative to its square, and the largest
   weight of 10⁶ samples relative to their mean, at twelve elevations up to 85° (the mean of the channels);
