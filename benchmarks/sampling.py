@@ -1,8 +1,10 @@
 """How noisy is a render with each sampler, and what does a sample cost? Ratios from one run.
 
-    uv run python benchmarks/sampling.py MATERIAL... [--size 128] [--spp 64] [--rounds 8] [--json FILE]
+    uv run python benchmarks/sampling.py FOLDER/nickel.binary ../shared/data/rgl/*.bsdf [--size 128] [--spp 64]
+        [--rounds 8] [--json FILE]
 
-For each MATERIAL and sampler:
+Each material is whatever `sommerl.load` reads, and is taken as it is: a MERL table is looked up trilinearly; RGL files
+are as they were measured, one-sided and with negative channels. For each material and sampler:
 
 * variance of the estimate of the albedo at five elevations of the viewer, relative to its square, and the largest
   weight of 10⁶ samples relative to their mean, at twelve elevations up to 85° (the mean of the channels);
