@@ -29,7 +29,7 @@ def coded(material: SomManBrdf, prior: Prior | None = None) -> _core.NodePalette
     assert isinstance(lattice, NodeLattice)
     gains, shapes = gain_codes(entries.gains), shape_codes(coordinates(entries.lut))
     if not (np.array_equal(gain_values(gains), entries.gains) and np.array_equal(shape_values(shapes), entries.lut)):
-        raise FormatError("expected a palette whose values have codes, found others")
+        raise FormatError(f"{material.name}: expected a palette whose values have codes, found others")
     return _core.NodePalette(*lattice.axes(), gains.tolist(), shapes.tolist(), **lattice.folds, prior=prior)
 
 
