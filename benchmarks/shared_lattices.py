@@ -16,9 +16,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
-from stand_in_library import LATTICE, Values
+from stand_in_library import Values, material
 
-from sommerl import SomManBrdf
 from sommerl.compression.compact.sharing import Example, train
 from sommerl.compression.smrl import library_file
 from sommerl.compression.smrl.library_index import Entry
@@ -69,13 +68,6 @@ def written(entries: list[Entry], data: Mapping[str, bytes], shared: Shared | No
     """The bytes of a file of materials."""
     out = io.BytesIO()
     return library_file.write(out, entries, data.__getitem__, shared)
-
-
-def material(name: str, values: Values) -> SomManBrdf:
-    """A stand-in's table as it was decoded, looked up trilinearly."""
-    index = np.zeros(LATTICE.shape, np.uint16)
-    index[LATTICE.above_horizon] = np.arange(len(values))
-    return SomManBrdf(values.astype(np.float64), index, LATTICE, name=name, interpolation="trilinear")
 
 
 if __name__ == "__main__":

@@ -54,7 +54,7 @@ def main() -> int:
         path = options.out / name / f"{number:04}.smrl"
         if not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
-            _write(path, f"{name} {number:04} (NP stand-in, changed)", values)
+            save(material(f"{name} {number:04} (NP stand-in, changed)", values), path)
         _tell("written", number + 1, options.count)
     return 0
 
@@ -143,13 +143,12 @@ def _evaluated(layers: list[tuple[Values, Values]], inputs: Values, latent: Valu
     return np.concatenate(parts)
 
 
-def _write(path: Path, name: str, values: Values) -> None:
-    """A material of cells, each with an entry of its own."""
+def material(name: str, values: Values) -> SomManBrdf:
+    """A material of cells with these values above the horizon, (cells, 3): each cell has an entry of its own."""
     above = LATTICE.above_horizon
     index = np.zeros(LATTICE.shape, np.uint16)
     index[above] = np.arange(int(above.sum()))
-    material = SomManBrdf(values.astype(np.float64), index, LATTICE, name=name, interpolation="trilinear")
-    save(material, path)
+    return SomManBrdf(values.astype(np.float64), index, LATTICE, name=name, interpolation="trilinear")
 
 
 if __name__ == "__main__":

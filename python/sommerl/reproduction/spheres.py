@@ -16,6 +16,7 @@ from ..render.metrics import exposure, psnr, to_srgb8
 from .cells import Cell, Outcome, Setting
 from .data import RULES
 from .printed import printed
+from .runner import values
 from .section import Item, Ours, Outcomes, Picture, Section, Table, compared, decibels, pictured, shown
 
 YELLOW, BLUE = "yellow-matte-plastic", "blue-metallic-paint"
@@ -95,9 +96,7 @@ def _show4(setting: Setting, outcomes: Outcomes) -> Section:
             [case_name(m, e), title, *(decibels(outcome.values[title][k]) for k in ("psnr_frame_db", "psnr_object_db"))]
             for title in RULES
         ]
-    rates = {
-        name[len("fig4/rates/") :]: each.values for name, each in outcomes.items() if name.startswith("fig4/rates/")
-    }
+    rates = values(outcomes, "fig4/rates/")
     tables = [
         Table("PSNR over the frame and over the object", ["case", "learnt by", "frame", "object"], rows),
         Table(

@@ -79,17 +79,30 @@ pub fn check_indices(lattice: &NodeLattice, palette: &Palette, gain: &[u16], sha
 /// `Error::PaletteCodes` or `Error::Indices` for what is no material of this format; and `Error::Reached` for one that no reader would
 /// take, because it is too much work.
 pub fn encode(material: &CompactMaterial, set: InstructionSet) -> Result<Vec<u8>, Error> {
-    encode_as(Layout::of(&material.lattice), material, set)
+    encode_as(Layout::of(&material.lattice), material, None, set)
 }
 
-/// The same in any layout that the material fits.
-pub(crate) fn encode_as(layout: Layout, material: &CompactMaterial, set: InstructionSet) -> Result<Vec<u8>, Error> {
+/// The part of a material's stream that is its own where its lattice is shared and the model begins with a prior: the palette and
+/// the indices. Gives the errors of `encode`.
+pub fn encode_part(material: &CompactMaterial, prior: &Prior, set: InstructionSet) -> Result<Vec<u8>, Error> {
+    encode_as(Layout::of(&material.lattice), material, Some(prior), set)
+}
+
+/// Either of them, in any layout that the material fits. With a prior, it is a part.
+pub(crate) fn encode_as(
+    layout: Layout,
+    material: &CompactMaterial,
+    prior: Option<&Prior>,
+    set: InstructionSet,
+) -> Result<Vec<u8>, Error> {
     material.check()?;
     let mut coder = Encoder::new();
-    let lattice = lattice(&mut coder, layout, Some(&material.lattice))?;
+    if prior.is_none() {
+        lattice(&mut coder, layout, Some(&material.lattice))?;
+    }
     let palette = palette(&mut coder, layout, Some(&material.palette))?;
     let (mut gain, mut shape) = (material.gain.clone(), material.shape.clone());
-    let reached = indices(set, &mut coder, &lattice, &palette, None, &mut gain, &mut shape, MOST_REACHED)?;
+    let reached = indices(set, &mut coder, &material.lattice, &palette, prior, &mut gain, &mut shape, MOST_REACHED)?;
     let stream = coder.finish();
     within_reach(reached, most_reached(stream.len()))?;
     Ok(stream)
@@ -100,31 +113,11 @@ pub(crate) fn encode_as(layout: Layout, material: &CompactMaterial, set: Instruc
 pub fn decode(data: &[u8], layout: Layout, set: InstructionSet) -> Result<CompactMaterial, Error> {
     let mut coder = Decoder::new(data);
     let lattice = lattice(&mut coder, layout, None)?;
-    let palette = palette(&mut coder, layout, None)?;
-    let (mut gain, mut shape) = (vec![0; lattice.nodes()], vec![0; lattice.nodes()]);
-    indices(set, &mut coder, &lattice, &palette, None, &mut gain, &mut shape, most_reached(data.len()))?;
-    if !coder.is_the_encoders() {
-        return Err(Error::OtherStream);
-    }
-    Ok(CompactMaterial { lattice, palette, gain, shape })
+    rest(coder, data.len(), layout, lattice, None, set)
 }
 
-/// The part of a material's stream that is its own where its lattice is shared and the model begins with a prior: the palette and
-/// the indices. Gives the errors of `encode`.
-pub fn encode_part(material: &CompactMaterial, prior: &Prior, set: InstructionSet) -> Result<Vec<u8>, Error> {
-    material.check()?;
-    let mut coder = Encoder::new();
-    let palette = palette(&mut coder, Layout::of(&material.lattice), Some(&material.palette))?;
-    let (mut gain, mut shape) = (material.gain.clone(), material.shape.clone());
-    let reached =
-        indices(set, &mut coder, &material.lattice, &palette, Some(prior), &mut gain, &mut shape, MOST_REACHED)?;
-    let stream = coder.finish();
-    within_reach(reached, most_reached(stream.len()))?;
-    Ok(stream)
-}
-
-/// The material of such a part, on the lattice that is shared, which has to be valid. Gives an error for every part that is not the
-/// only one of a material, and neither panics nor takes long for any bytes.
+/// The material of a part, on the lattice that is shared. Gives an error for every part that is not the only one of a material, and
+/// neither panics nor takes long for any bytes; `Error::Lattice` for a lattice that no file can hold.
 pub fn decode_part(
     data: &[u8],
     lattice: &NodeLattice,
@@ -132,14 +125,25 @@ pub fn decode_part(
     set: InstructionSet,
 ) -> Result<CompactMaterial, Error> {
     lattice.check()?;
-    let mut coder = Decoder::new(data);
-    let palette = palette(&mut coder, Layout::of(lattice), None)?;
+    rest(Decoder::new(data), data.len(), Layout::of(lattice), lattice.clone(), Some(prior), set)
+}
+
+/// The material of a stream of so many bytes, of which the lattice has been read, or is shared.
+fn rest(
+    mut coder: Decoder,
+    bytes: usize,
+    layout: Layout,
+    lattice: NodeLattice,
+    prior: Option<&Prior>,
+    set: InstructionSet,
+) -> Result<CompactMaterial, Error> {
+    let palette = palette(&mut coder, layout, None)?;
     let (mut gain, mut shape) = (vec![0; lattice.nodes()], vec![0; lattice.nodes()]);
-    indices(set, &mut coder, lattice, &palette, Some(prior), &mut gain, &mut shape, most_reached(data.len()))?;
+    indices(set, &mut coder, &lattice, &palette, prior, &mut gain, &mut shape, most_reached(bytes))?;
     if !coder.is_the_encoders() {
         return Err(Error::OtherStream);
     }
-    Ok(CompactMaterial { lattice: lattice.clone(), palette, gain, shape })
+    Ok(CompactMaterial { lattice, palette, gain, shape })
 }
 
 /// How many bits the stream of a material takes: for lattice and palette, and for the indices; with a prior, those of its part. Gives

@@ -65,12 +65,16 @@ class SharedFitter:
         fitting = [each for each in shared.lattices if all(allowed[name] or not on for name, on in each.folds.items())]
         if not fitting:
             raise MaterialError(f"{brdf.name}: none of the shared lattices can hold it, since they fold φ_d")
+        sources: dict[
+            tuple[bool, ...], FittedSource
+        ] = {}  # lattices that fold φ_d alike are fitted to the same directions
         found: list[tuple[Problem, float]] = []
         for lattice in fitting:
-            # All have the same directions, as far as they fold φ_d alike.
-            source = FittedSource(brdf, lattice.folds, np.random.Generator(np.random.PCG64(seed)))
-            source.prepare(effort.directions)
-            found.append((source.problem(lattice), source.scale))
+            folds = tuple(lattice.folds.values())
+            if folds not in sources:
+                sources[folds] = FittedSource(brdf, lattice.folds, np.random.Generator(np.random.PCG64(seed)))
+                sources[folds].prepare(effort.directions)
+            found.append((sources[folds].problem(lattice), sources[folds].scale))
         problem, self.scale = min(found, key=lambda each: each[0].error)
         self._problem = replace(problem, prior=shared.prior)
 

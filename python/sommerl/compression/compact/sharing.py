@@ -50,7 +50,8 @@ def train(
     lattices, learnt = list[NodeLattice](), list[Prior]()
     for group in groups:
         brdfs = [example.load() for example in group]
-        folds = {name: all(folds_of(brdf)[name] for brdf in brdfs) for name in ("reciprocal", "mirrored")}
+        allowed = [folds_of(brdf) for brdf in brdfs]
+        folds = {name: all(each[name] for each in allowed) for name in ("reciprocal", "mirrored")}
         sources = [FittedSource(brdf, folds, random) for brdf in brdfs]
         nodes = usual_nodes(size + SAVED)
         lattice = LatticeChoice(sources, random, effort.lines * len(sources) // 2).lattice(nodes)

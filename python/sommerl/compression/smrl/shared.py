@@ -52,9 +52,7 @@ class Shared:
         for lattice in self.lattices:
             even = np.zeros(lattice.size, np.uint16)
             try:
-                stream = _core.NodePalette(*lattice.axes(), [0], [[0, 0]], **lattice.folds, prior=None).encode(
-                    even, even
-                )
+                stream = _even(lattice).encode(even, even)
             except (ValueError, OverflowError) as error:
                 raise FormatError(f"shared lattices: {error}") from error
             flags = RECIPROCAL * lattice.reciprocal | MIRRORED * lattice.mirrored
@@ -78,7 +76,7 @@ class Shared:
                 palette, _ = _core.NodePalette.decode(reader.take(length), *folds)
                 lattices.append(node_parts.lattice_of(palette))
             found = Shared(tuple(lattices), (weights, model[NEIGHBOURS * COORDINATES :]))
-            _even(found, 0)
+            _even(lattices[0], found.prior)
         except (ValueError, IndexError, OverflowError, SommerlError) as error:
             raise FormatError(f"shared lattices: {error}") from error
         if found.encode() != data or len(set(lattices)) != count:
@@ -110,15 +108,14 @@ class Shared:
         if number >= len(self.lattices) or flags & ~(SIGNED | SMOOTH):
             raise FormatError(f"expected the number of a shared lattice and its flags, found {number} and {flags}")
         try:
-            palette, indices = _even(self, number).decode_part(reader.rest())
+            palette, indices = _even(self.lattices[number], self.prior).decode_part(reader.rest())
         except ValueError as error:
             raise FormatError(str(error)) from error
         domain = scale, bool(flags & SIGNED), bool(flags & SMOOTH)
         return node_parts.material(palette, indices, self.lattices[number], domain, known)
 
 
-def _even(shared: Shared, number: int) -> _core.NodePalette:
-    """The core's object for a shared lattice with one entry, which reads parts. Raises ValueError for a prior that is
-    out of range."""
-    lattice = shared.lattices[number]
-    return _core.NodePalette(*lattice.axes(), [0], [[0, 0]], **lattice.folds, prior=shared.prior)
+def _even(lattice: NodeLattice, prior: Prior | None = None) -> _core.NodePalette:
+    """The core's object for a lattice and one entry: it writes even materials, and with a prior it reads parts. Raises
+    ValueError for a prior that is out of range."""
+    return _core.NodePalette(*lattice.axes(), [0], [[0, 0]], **lattice.folds, prior=prior)

@@ -83,7 +83,7 @@ fn golden_bytes_of_format_2_mean_what_they_meant() {
 
 /// Whether a material gives these bytes.
 fn gives(material: &CompactMaterial, stream: &[u8], layout: Layout) -> bool {
-    InstructionSet::available().all(|set| encode_as(layout, material, set).is_ok_and(|data| data == stream))
+    InstructionSet::available().all(|set| encode_as(layout, material, None, set).is_ok_and(|data| data == stream))
 }
 
 #[test]
@@ -107,7 +107,7 @@ fn refused_or_the_only_stream(
     read: impl Fn(&[u8], Layout) -> Result<CompactMaterial, Error>,
 ) -> bool {
     match read(data, layout) {
-        Ok(found) => encode_as(layout, &found, InstructionSet::fastest()).is_ok_and(|again| again == data),
+        Ok(found) => encode_as(layout, &found, None, InstructionSet::fastest()).is_ok_and(|again| again == data),
         Err(_) => true,
     }
 }
