@@ -137,7 +137,8 @@ def read_plainly(data):
     def decoded(stream, reciprocal, mirrored, version):
         *axes, gains, shapes, gain, shape = reference_codec.decode(stream, mirrored, version)
         names = ("theta_h", "band", "theta_d", "phi_d", "gains", "shapes")
-        palette = SimpleNamespace(**dict(zip(names, (*axes, gains, shapes), strict=True)))
+        folds = {"reciprocal": reciprocal, "mirrored": mirrored}
+        palette = SimpleNamespace(**dict(zip(names, (*axes, gains, shapes), strict=True)), **folds)
         return palette, tuple(np.array(index, np.uint16) for index in (gain, shape))
 
     with pytest.MonkeyPatch.context() as patch:

@@ -181,6 +181,7 @@ def _nodes(material: SomManBrdf) -> bytes:
 
 def _from_nodes(version: int, reader: Reader, known: dict[str, Any]) -> SomManBrdf:
     (scale,) = reader.unpack(SCALE)
+    node_parts.check_scale(scale)
     (flags,) = reader.unpack(BYTE) if version > 1 else (RECIPROCAL,)
     if flags > RECIPROCAL | MIRRORED | SIGNED | SMOOTH:
         raise FormatError(f"expected flags from 0 to 15, found {flags}")

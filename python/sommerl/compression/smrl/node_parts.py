@@ -33,6 +33,12 @@ def coded(material: SomManBrdf, prior: Prior | None = None) -> _core.NodePalette
     return _core.NodePalette(*lattice.axes(), gains.tolist(), shapes.tolist(), **lattice.folds, prior=prior)
 
 
+def check_scale(scale: float) -> None:
+    """Raises FormatError for a scale that is none."""
+    if not 0 < scale < np.inf:
+        raise FormatError("expected a positive scale that is finite, found another")
+
+
 def lattice_of(palette: _core.NodePalette) -> NodeLattice:
     """The lattice of what a stream held."""
     theta_d, phi_d = (tuple(map(tuple, axes)) for axes in (palette.theta_d, palette.phi_d))
@@ -43,9 +49,6 @@ def lattice_of(palette: _core.NodePalette) -> NodeLattice:
 def material(
     palette: _core.NodePalette, indices: Indices, lattice: NodeLattice, domain: Domain, known: dict[str, Any]
 ) -> SomManBrdf:
-    """The material of what a stream held. known: other arguments of `SomManBrdf`. Raises FormatError for a scale that
-    is none."""
-    if not 0 < domain[0] < np.inf:
-        raise FormatError("expected a positive scale that is finite, found another")
+    """The material of what a stream held. known: other arguments of `SomManBrdf`."""
     shapes, gains = shape_values(np.array(palette.shapes)), gain_values(np.array(palette.gains))
     return SomManBrdf(GainsAndShapes(gains, shapes, *domain), np.stack(indices), lattice, **known)

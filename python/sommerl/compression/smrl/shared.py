@@ -105,6 +105,7 @@ class Shared:
         reader = Reader(part, 0)
         fields = reader.unpack(PART)
         number, flags, scale = int(fields[0]), int(fields[1]), float(fields[2])
+        node_parts.check_scale(scale)
         if number >= len(self.lattices) or flags & ~(SIGNED | SMOOTH):
             raise FormatError(f"expected the number of a shared lattice and its flags, found {number} and {flags}")
         try:
