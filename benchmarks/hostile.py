@@ -38,8 +38,9 @@ import sommerl
 from sommerl import Lattice
 from sommerl.compression.palette import GainsAndShapes
 from sommerl.compression.smrl import file as smrl
-from sommerl.compression.smrl import library_file
+from sommerl.compression.smrl import library_file, library_index, node_parts
 from sommerl.compression.smrl.codes import gain_values, shape_values
+from sommerl.compression.smrl.shared import Shared
 from sommerl.factored import file as fbrdf
 from sommerl.factored.material import COLUMNS, ELEVATIONS, ROWS, FactoredBrdf
 from sommerl.formats import cornell, fits, merl, nbrdf, numpy_files, samples, smrlib, tensor, text
@@ -317,17 +318,17 @@ def stream_of_cells(whole: bytes) -> int:
 
 
 def library_seeds() -> list[bytes]:
-    """Libraries of some materials, and of one."""
+    """Libraries of some materials, of one, and of some that share their lattices."""
     materials = {f"{kind}/{number}": data for kind, seeds in (("nodes", nodes_seeds), ("cells", cells_seeds))
                  for number, data in enumerate(seeds())}  # fmt: skip
     files: list[bytes] = []
-    for names in (list(materials), list(materials)[:1]):
+    for names, shared in ((list(materials), None), (list(materials)[:1], None), (list(materials), common()[0])):
         out = io.BytesIO()
         entries = [
-            library_file.Entry(name, f"{name}.bsdf", 7, "ab" * 32, {"seed": 1}, {"psnr_soft_db": 50.0})
+            library_index.Entry(name, f"{name}.bsdf", 7, "ab" * 32, {"seed": 1}, {"psnr_soft_db": 50.0})
             for name in names
         ]
-        library_file.write(out, entries, materials.__getitem__)
+        library_file.write(out, entries, materials.__getitem__, shared)
         files.append(out.getvalue())
     return files
 
@@ -340,23 +341,49 @@ def in_library(path: Path) -> Any:
 
 
 def below_sums(rng: random.Random, whole: bytes, mutate: Mutate) -> bytes:
-    """A library, damaged below its checksums: in the table of sections, in the index, or in what that inflates to."""
-    head, count = library_file.HEAD.size, library_file.COUNT.size
-    start = head + count + 2 * library_file.SECTION.size
-    size = library_file.SECTION.unpack_from(whole, head + count)[2]
-    index, materials = whole[start : start + size], whole[start + size :]
-    kind = rng.randrange(3)
-    if kind == 1:
-        index = mutate(rng, index)
-    elif kind == 2:
-        front = library_file.INDEX_HEAD.size
-        index = index[:front] + sealed_file.deflated(mutate(rng, zlib.decompress(index[front:], -zlib.MAX_WBITS)))
-    rows = ((library_file.INDEX, index, zlib.crc32(index)), (library_file.MATERIALS, materials, 0))
-    table = library_file.COUNT.pack(2)
-    table += b"".join(library_file.SECTION.pack(each, 1, len(data), crc) for each, data, crc in rows)
-    if kind == 0:
+    """A library, damaged below its checksums: in the table of sections, in one of them, or in what the index inflates
+    to."""
+    at = library_file.HEAD.size
+    (count,) = library_file.COUNT.unpack_from(whole, at)
+    at += library_file.COUNT.size
+    rows = [library_file.SECTION.unpack_from(whole, at + n * library_file.SECTION.size) for n in range(count)]
+    at += count * library_file.SECTION.size
+    sections: list[bytes] = []
+    for _, _, size, _ in rows:
+        sections.append(whole[at : at + size])
+        at += size
+    damaged = rng.randrange(-2, count)
+    if damaged == -2:
+        front = library_index.INDEX_HEAD.size
+        head, payload = sections[0][:front], zlib.decompress(sections[0][front:], -zlib.MAX_WBITS)
+        sections[0] = head + sealed_file.deflated(mutate(rng, payload))
+    elif damaged >= 0:
+        sections[damaged] = mutate(rng, sections[damaged])
+    table = library_file.COUNT.pack(count) + b"".join(
+        library_file.SECTION.pack(kind, flags, len(data), crc and zlib.crc32(data))
+        for (kind, flags, _, crc), data in zip(rows, sections, strict=True)
+    )
+    if damaged == -1:
         table = mutate(rng, table)
-    return library_file.HEAD.pack(library_file.MAGIC, 1, zlib.crc32(table)) + table + index + materials
+    return library_file.HEAD.pack(library_file.MAGIC, 1, zlib.crc32(table)) + table + b"".join(sections)
+
+
+def common() -> tuple[Shared, list[sommerl.SomManBrdf]]:
+    """What some materials share, and they."""
+    materials = [smrl.decode(data) for data in nodes_seeds()]
+    lattices = dict.fromkeys(each.lattice for each in materials if isinstance(each.lattice, NodeLattice))
+    weights, levels = node_parts.coded(materials[0]).learnt(*materials[0].index)
+    prior = np.float32(weights).tolist(), np.float32(levels).tolist()
+    return Shared(tuple(lattices), prior), materials
+
+
+def part_seeds() -> list[bytes]:
+    shared, materials = common()
+    return [part for each in materials if (part := shared.part(each))]
+
+
+def part_of_library(path: Path) -> Any:
+    return common()[0].material(door.read(path, smrl.LONGEST_FILE), KNOWN)
 
 
 def fbrdf_seeds() -> list[bytes]:
@@ -566,6 +593,7 @@ READERS = [
         inflated(stream_of_cells),
     ),
     Reader("library", ".smrlib", library_seeds, in_library, smrlib.MOST_READ, evaluated, below_sums),
+    Reader("part", ".part", part_seeds, part_of_library, smrl.LONGEST_FILE, evaluated),
     Reader(
         "fbrdf", ".fbrdf", fbrdf_seeds, sommerl.load, fbrdf.LONGEST_FILE, evaluated, inflated(stream_of_factors)
     ),

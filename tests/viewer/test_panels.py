@@ -384,3 +384,30 @@ def test_the_panels_of_a_measurement(browse, tmp_path, width, columns, scheme):
     said = shown.locator("#panels .said").nth(1).text_content()
     turned = shown.locator("#panels .panel:nth-child(2) output").text_content()
     assert round(float(said.partition("φd = ")[2].partition("°")[0])) == int(turned[:-1])
+
+
+# Jobs that have begun, or are about to, when a second material comes.
+ANOTHER = """(kept) => {
+    const { panels } = sommerl;
+    if (kept) panels.work.drop = () => {};
+    const [material] = panels.materials;
+    panels.setMaterials([material, null]);
+    panels.now();
+    panels.setMaterials([material, material]);
+    const errors = [];
+    for (let turn = 0; turn < 100; turn++) {
+        try {
+            panels.work.run();
+        } catch (error) {
+            errors.push(error.message);
+        }
+    }
+    return errors;
+}"""
+
+
+def test_another_material_while_the_first_is_drawn(browse):
+    shown = browse(page([held(MATERIALS["cells"], "a")]))
+    assert shown.evaluate(ANOTHER, False) == []
+    wait_until(shown, f"{DRAWN} && sommerl.panels.albedo.curves.length === 2")
+    assert "push" in shown.evaluate(ANOTHER, True)[0]

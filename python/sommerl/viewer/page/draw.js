@@ -314,6 +314,11 @@ export class Work {
         this.wake();
     }
 
+    /** Nothing goes on: what the jobs were about is gone. */
+    drop() {
+        for (const jobs of [this.jobs, this.waiting]) jobs.clear();
+    }
+
     wake() {
         this.timer ??= setTimeout(() => this.run(), PAUSE);
     }

@@ -41,6 +41,7 @@ export class Panels {
     /** [a, b]: decoded materials, with a label and a number of bytes; b may be null. */
     setMaterials([a, b]) {
         this.highlight(null);
+        this.work.drop(); // what it draws has other materials' curves
         this.materials = b ? [a, b] : [a];
         // At first, the one that has a palette: it is what there is to understand.
         const first = Math.max(this.materials.findIndex(({ kind }) => kind === "cells" || kind === "nodes"), 0);
