@@ -123,7 +123,7 @@ def tree(rng: np.random.Generator, deepest: int) -> dict[str, object]:
     if kind == "leaf":
         return leaf(rng)
     if kind == "blendbsdf":
-        both = {"a": tree(rng, deepest - 1), "b": tree(rng, deepest - 1)}
+        both: dict[str, object] = {"a": tree(rng, deepest - 1), "b": tree(rng, deepest - 1)}
         return {"type": kind, "weight": bitmap(rng) if rng.random() < 0.5 else float(rng.random())} | both
     if kind == "mask":
         return {"type": kind, "opacity": bitmap(rng) if rng.random() < 0.5 else float(rng.random()), "b": tree(rng, 0)}

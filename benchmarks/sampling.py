@@ -98,7 +98,7 @@ def errors(
     mi = mitsuba()
     scenes = {name: sphere(one.brdf, environment, sampler=one, size=arguments.size) for name, one in samplers.items()}
     # Pixels of the outline have the noise of what they cover, too.
-    mask = binary_erosion(render(next(iter(scenes.values())), spp=1).mask, np.ones((3, 3)))
+    mask: Any = binary_erosion(render(next(iter(scenes.values())), spp=1).mask, np.ones((3, 3)))
     integrator = mi.load_dict(plugin)
     images: dict[str, list[Any]] = {name: [] for name in scenes}
 

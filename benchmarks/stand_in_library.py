@@ -128,11 +128,11 @@ def _layers(path: Path) -> list[tuple[Values, Values]]:
 def _evaluated(layers: list[tuple[Values, Values]], inputs: Values, latent: Values) -> Values:
     # What the first layer makes of the latent numbers is the same for all cells.
     (first, bias), *rest = layers
-    layers = [(first[: inputs.shape[1]], bias + latent @ first[inputs.shape[1] :]), *rest]
+    folded: list[tuple[Any, Any]] = [(first[: inputs.shape[1]], bias + latent @ first[inputs.shape[1] :]), *rest]
     parts: list[Any] = []
     for start in range(0, len(inputs), AT_ONCE):
         x = inputs[start : start + AT_ONCE]
-        for weights, bias in layers:
+        for weights, bias in folded:
             x = x @ weights
             x += bias
             np.maximum(x, 0.0, out=x)
