@@ -82,7 +82,7 @@ class ReadingArguments(Arguments):
     max_dropped: float = option(
         default=MOST_DROPPED,
         metavar="SHARE",
-        help="of tables of samples: the most rows that are left out since they have no numbers or lie below the horizon",
+        help="of tables of samples: the most rows that are left out, without numbers or below the horizon",
     )
 
 

@@ -16,8 +16,22 @@ from ..models.builtin import NAMES
 from ..system import threads
 from ..system.files import replacing_files
 from . import (
-    blend, compare, completion, compress, convert, demo, evaluate, factor, fit, info, library, paper, plot, render, view,
-)  # fmt: skip
+    blend,
+    compare,
+    completion,
+    compress,
+    convert,
+    demo,
+    evaluate,
+    factor,
+    fit,
+    info,
+    library,
+    paper,
+    plot,
+    render,
+    view,
+)
 from .arguments import ReadingArguments, WritingArguments, named_as_typed, read
 from .console import warn
 from .folders import empty_ones_removed
@@ -45,7 +59,23 @@ Examples:
 
 
 # In the order in which help lists them.
-COMMANDS = (demo, compress, info, convert, evaluate, blend, compare, fit, factor, render, plot, view, library, paper, completion)
+COMMANDS = (
+    demo,
+    compress,
+    info,
+    convert,
+    evaluate,
+    blend,
+    compare,
+    fit,
+    factor,
+    render,
+    plot,
+    view,
+    library,
+    paper,
+    completion,
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -74,7 +104,12 @@ def _run(typed: Sequence[str]) -> Mapping[str, Any] | None:
         threads.use(threads.checked(options.threads, threads.OPTION))
     threads.limit()
     overwrite = isinstance(options, WritingArguments) and options.overwrite
-    with warnings.catch_warnings(), replacing_files(overwrite=overwrite), empty_ones_removed(), reading(_reading(options)):
+    with (
+        warnings.catch_warnings(),
+        replacing_files(overwrite=overwrite),
+        empty_ones_removed(),
+        reading(_reading(options)),
+    ):
         warnings.showwarning = _warned
         return found.run(options)
 

@@ -24,8 +24,7 @@ class EvalArguments(ReadingArguments, WritingArguments):
     material: Material = positional("MATERIAL", help="a file or a built-in name")
     directions: Path = positional(
         "DIRECTIONS",
-        help="a table with columns of angles, as theta_i_deg, phi_i_deg, theta_o_deg, phi_o_deg; whatever else it has is "
-        "ignored",
+        help="a table with columns of angles, as theta_i_deg, phi_i_deg, theta_o_deg, phi_o_deg; others are ignored",
     )
     output: Path = option(
         "-o",

@@ -38,7 +38,7 @@ def _angles(theta_l: Values, phi_l: Values, theta_v: Values, phi_v: Values) -> P
 
 def _half(theta_h: Values, phi_h: Values, theta_d: Values, phi_d: Values) -> Pair:
     """In ALTA it is V that lies at the difference angles."""
-    viewer, light = (np.stack(w, -1) for w in directions(theta_h, theta_d, phi_d))
+    viewer, light = (np.stack(w, -1).astype(np.float64) for w in directions(theta_h, theta_d, phi_d))
     turn, up = np.stack([np.cos(phi_h), np.sin(phi_h)], -1), np.zeros((len(phi_h), 1))
     turned = [
         np.concatenate([w[:, :1] * turn + w[:, 1:2] * turn[:, ::-1] * [-1, 1], w[:, 2:] + up], axis=1)
@@ -51,16 +51,37 @@ def _projected(theta_l: Values, x: Values, y: Values) -> Pair:
     return _angles(theta_l, 0 * theta_l, np.hypot(x, y), np.arctan2(y, x))
 
 
+def _viewer_first(theta_v: Values, theta_l: Values, phi: Values) -> Pair:
+    return _angles(theta_l, 0 * phi, theta_v, phi)
+
+
+def _isotropic(theta_h: Values, theta_d: Values, phi_d: Values) -> Pair:
+    return _half(theta_h, 0 * theta_h, theta_d, phi_d)
+
+
+def _without_azimuth(theta_h: Values, theta_d: Values) -> Pair:
+    """ALTA takes φ_d for π/2 where there is none."""
+    return _half(theta_h, 0 * theta_h, theta_d, 0 * theta_h + np.pi / 2)
+
+
+def _cosines(cos_h: Values, cos_d: Values) -> Pair:
+    return _without_azimuth(*(np.arccos(np.clip(cosine, -1, 1)) for cosine in (cos_h, cos_d)))
+
+
+def _cartesian(x: Values, y: Values, z: Values, u: Values, v: Values, w: Values) -> Pair:
+    return np.stack([u, v, w], -1), np.stack([x, y, z], -1)
+
+
 # How the numbers of each parametrisation name a pair of directions: to the light, to the viewer.
 PARAMETRISATIONS: dict[str, tuple[int, Callable[..., Pair]]] = {
     "ISOTROPIC_TL_TV_PROJ_DPHI": (3, _projected),
-    "ISOTROPIC_TV_TL_DPHI": (3, lambda v, light, phi: _angles(light, 0 * phi, v, phi)),
+    "ISOTROPIC_TV_TL_DPHI": (3, _viewer_first),
     "SPHERICAL_TL_PL_TV_PV": (4, _angles),
-    "RUSIN_TH_TD_PD": (3, lambda h, d, p: _half(h, 0 * h, d, p)),
+    "RUSIN_TH_TD_PD": (3, _isotropic),
     "RUSIN_TH_PH_TD_PD": (4, _half),
-    "RUSIN_TH_TD": (2, lambda h, d: _half(h, 0 * h, d, 0 * h + np.pi / 2)),
-    "COS_TH_TD": (2, lambda h, d: _half(np.arccos(h), 0 * h, np.arccos(d), 0 * h + np.pi / 2)),
-    "CARTESIAN": (6, lambda x, y, z, u, v, w: (np.stack([u, v, w], -1), np.stack([x, y, z], -1))),
+    "RUSIN_TH_TD": (2, _without_azimuth),
+    "COS_TH_TD": (2, _cosines),
+    "CARTESIAN": (6, _cartesian),
 }
 
 
@@ -99,7 +120,9 @@ def samples_of(path: Path, data: bytes) -> samples.Found:
     wanted = re.fullmatch(rf"{inputs}\s+([13])", dimensions)
     if not wanted or (values or int(wanted[1])) != int(wanted[1]):
         expected = f"{inputs} {values or '1 or 3'}"
-        raise FormatError(f"{path}: line {line}: #DIM: expected {expected} for {parametrisation}, found {dimensions[:40]}")
+        raise FormatError(
+            f"{path}: line {line}: #DIM: expected {expected} for {parametrisation}, found {dimensions[:40]}"
+        )
     outputs = int(wanted[1])
     names = [f"x{n}" for n in range(1, inputs + 1)] + [f"y{n}" for n in range(1, outputs + 1)]
     table = sample_text.rows_of(path, data, names)

@@ -1,5 +1,5 @@
-"""The angles of samples as people measure them: in degrees or radians, signed in a plane, with the azimuth of the viewer
-or that between both."""
+"""The angles of samples as people measure them: in degrees or radians, signed in a plane, with the azimuth of the
+viewer or that between both."""
 
 from __future__ import annotations
 
@@ -32,13 +32,15 @@ def in_radians(
 ) -> tuple[dict[str, Values], str]:
     """Columns of angles, by their roles, in radians; and how their unit was found, for people.
 
-    where: names a row in messages, of its number. header: names the line with the names, for messages. A column that states its unit has it; the others are in degrees if one
-    of them holds an angle that radians do not reach, else in the unit of those that state one, else in radians. NaN
-    stays. Raises FormatError for angles that cannot be.
+    where: names a row in messages, of its number. header: names the line with the names, for messages. A column that
+    states its unit has it; the others are in degrees if one of them holds an angle that radians do not reach, else in
+    the unit of those that state one, else in radians. NaN stays. Raises FormatError for angles that cannot be.
     """
     stated = {each.unit for each in given.values() if each.unit}
     silent = {role: each for role, each in given.items() if not each.unit}
-    beyond = any(_largest(each) > (HALF if role.startswith("theta") else TURN) * LITTLE for role, each in silent.items())
+    beyond = any(
+        _largest(each) > (HALF if role.startswith("theta") else TURN) * LITTLE for role, each in silent.items()
+    )
     unit = "deg" if beyond else stated.pop() if len(stated) == 1 else "rad"
     found: dict[str, Values] = {}
     for role, each in given.items():
@@ -78,7 +80,7 @@ def directions(angles: Mapping[str, Values]) -> tuple[Values, str]:
         known = np.isfinite(theta_i)
         if (theta_i[known] < 0).any() and (theta_i[known] > 0).any():
             raise FormatError(
-                "theta_i: expected one sign, or a column of azimuths that says on which side the viewer is, found both signs"
+                "theta_i: expected one sign, or a column of azimuths that says where the viewer is, found both signs"
             )
         opposite = not (theta_i[known] < 0).any()
         phi_i, phi_o = zero.copy(), zero + (HALF if opposite else 0.0)
@@ -102,5 +104,6 @@ def _check(role: str, given: Given, degrees: bool, where: Callable[[int], str]) 
     if wrong.any():
         row = int(np.argmax(wrong))
         raise FormatError(
-            f"{given.name}: expected angles from {-most:.6g} to {most:.6g} {unit}, found {given.numbers[row]:g} in {where(row)}"
+            f"{given.name}: expected angles from {-most:.6g} to {most:.6g} {unit}, "
+            f"found {given.numbers[row]:g} in {where(row)}"
         )

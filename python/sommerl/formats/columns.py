@@ -1,9 +1,9 @@
 """What the names of columns say: which angle or value a column holds, and in which unit.
 
-Of the light: `theta_i`, `theta_in`, `incident zenith`, `SZA`, `phi_i`, …; of the viewer: `_o`, `_r`, `_s`, `_v`, `out`, `ref`,
-`scattered`, `viewing`, …; between the two: `dphi`, `Δφ`, `relative azimuth`, and `phi` alone. Values: `r`, `g`, `b`; CIE
-`X`, `Y`, `Z`; wavelengths, `550`, `550nm`, `R550`; one grey value, `brdf`. A unit stands behind a name: `theta_i_deg`,
-`theta_i [°]`, `phi (rad)`.
+Of the light: `theta_i`, `theta_in`, `incident zenith`, `SZA`, `phi_i`, …; of the viewer: `_o`, `_r`, `_s`, `_v`, `out`,
+`ref`, `scattered`, `viewing`, …; between the two: `dphi`, `Δφ`, `relative azimuth`, and `phi` alone. Values: `r`, `g`,
+`b`; CIE `X`, `Y`, `Z`; wavelengths, `550`, `550nm`, `R550`; one grey value, `brdf`. A unit stands behind a name:
+`theta_i_deg`, `theta_i [°]`, `phi (rad)`.
 """
 
 from __future__ import annotations
@@ -19,33 +19,38 @@ RGB, XYZ = ("r", "g", "b"), ("x", "y", "z")
 GREY, FACTOR, WAVELENGTH = "grey", "factor", "nm"  # a factor is π times f_r
 
 _GREEK = str.maketrans(
-    {
-        "θ": " theta ", "ϑ": " theta ", "Θ": " theta ", "φ": " phi ", "ϕ": " phi ", "Φ": " phi ",
-        "Δ": " delta ", "δ": " delta ", "∆": " delta ", "λ": " lambda ", "β": " beta ", "ρ": " rho ", "ᵢ": " i ", "ₒ": " o ",
-        "\u00a0": " ",
-    }
-)  # fmt: skip
-_UNIT = re.compile(r"(?:degrees?|deg|°|º|radians?|rads?|\(?1\s*/\s*sr\)?|sr\s*\^?\s*\(?[-−]1\)?|%|percent|nm)", re.IGNORECASE)
-_TRAILING = re.compile(rf"[\s_\-/,:(\[]*(?:in\s+)?({_UNIT.pattern})[\s)\]]*$", re.IGNORECASE)
-_LIGHT = set("i in inc incident incidence incoming light l source src illumination illum lamp sun solar input".split())
-_VIEWER = set(
-    "o out outgoing output r ref refl reflected reflection s sc scat scatter scattered scattering v view viewing viewer "
-    "det detector receiver rec obs observer observation exit exitant e emergent emergence camera".split()
+    dict.fromkeys("θϑΘ", " theta ")
+    | dict.fromkeys("φϕΦ", " phi ")
+    | dict.fromkeys("Δδ∆", " delta ")
+    | {"λ": " lambda ", "β": " beta ", "ᵢ": " i ", "ₒ": " o ", "\u00a0": " "}
 )
-_THETA = set("theta th zenith polar inclination".split())
-_PHI = set("phi azimuth azimuthal az azi".split())
-_BETWEEN = set("d delta rel relative diff difference".split())
-_FILLER = set("angle angles of direction the".split())
+_UNIT = re.compile(
+    r"(?:degrees?|deg|°|º|radians?|rads?|\(?1\s*/\s*sr\)?|sr\s*\^?\s*\(?[-−]1\)?|%|percent|nm)", re.IGNORECASE
+)
+_TRAILING = re.compile(rf"[\s_\-/,:(\[]*(?:in\s+)?({_UNIT.pattern})[\s)\]]*$", re.IGNORECASE)
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+_LIGHT = _words("i in inc incident incidence incoming light l source src illumination illum lamp sun solar input")
+_VIEWER = _words(
+    "o out outgoing output r ref refl reflected reflection s sc scat scatter scattered scattering v view viewing "
+    "viewer det detector receiver rec obs observer observation exit exitant e emergent emergence camera"
+)
+_THETA = _words("theta th zenith polar inclination")
+_PHI = _words("phi azimuth azimuthal az azi")
+_BETWEEN = _words("d delta rel relative diff difference")
+_FILLER = _words("angle angles of direction the")
 _SHORT = {
     "aoi": "theta_i", "sza": "theta_i", "vza": "theta_o", "saa": "phi_i", "vaa": "phi_o", "raa": "dphi",
     "angleofincidence": "theta_i", "incidenceangle": "theta_i", "incidentangle": "theta_i", "viewingangle": "theta_o",
     "viewangle": "theta_o", "scatterangle": "theta_o", "scatteringangle": "theta_o", "scatteredangle": "theta_o",
     "detectorangle": "theta_o", "reflectionangle": "theta_o", "anglein": "theta_i", "angleout": "theta_o",
 }  # fmt: skip
-_GREY_NAMES = set(
-    "brdf bsdf fr f value values val grey gray mono lum luminance brdfvalue bsdfvalue reflectancedistribution".split()
-)
-_FACTOR_NAMES = set("brf reflectancefactor radiancefactor beta".split())
+_GREY_NAMES = _words("brdf bsdf fr f value values val grey gray mono lum luminance brdfvalue bsdfvalue")
+_FACTOR_NAMES = _words("brf reflectancefactor radiancefactor beta")
 _COLOURS = {"red": "r", "green": "g", "blue": "b"}
 _BEFORE_VALUE = r"(?:brdf|bsdf|f_?r|value|val|refl|reflectance|linear|cie|srgb|rgb|xyz)"
 _SPECTRAL = re.compile(r"(?:[a-z_ ]+[\s_(\[=a-z]*)??(\d{3,4}(?:\.\d+)?)[\s_]*(?:nm)?[\s)\]]*", re.IGNORECASE)
@@ -74,7 +79,7 @@ def split_unit(name: str) -> tuple[str, Unit]:
     if bracketed:
         return name[: bracketed.start()] + " " + name[bracketed.end() :], unit_of(bracketed[1])
     found = _TRAILING.search(name)
-    if not found or (found.start() == 0 and not found[0].strip(" ([])") == found[1]):
+    if not found or found.start() == 0:
         return name, ""
     return name[: found.start()], unit_of(found[1])
 
@@ -91,7 +96,10 @@ def unit_of(text: str) -> Unit:
 
 def is_unit(text: str) -> bool:
     """Whether a cell holds a unit and nothing else."""
-    return not text.strip() or re.fullmatch(rf"[\s(\[]*(?:{_UNIT.pattern}|[-–a-z.]{{1,6}})[\s)\]]*", text.strip("\"' "), re.I) is not None
+    return (
+        not text.strip()
+        or re.fullmatch(rf"[\s(\[]*(?:{_UNIT.pattern}|[-–a-z.]{{1,6}})[\s)\]]*", text.strip("\"' "), re.I) is not None
+    )
 
 
 def is_angle(name: str) -> bool:
@@ -121,7 +129,7 @@ def _angle(body: str, unit: Unit) -> Column | None:
 
 
 def _unjoined(word: str) -> list[str]:
-    """"thetain" as "theta" and "in", "dphi" as "d" and "phi"; other words as they are."""
+    """ "thetain" as "theta" and "in", "dphi" as "d" and "phi"; other words as they are."""
     for kind in ("theta", "phi", "azimuth", "zenith"):
         if word.startswith(kind) and word != kind and word not in _PHI:
             return [kind, word[len(kind) :]]

@@ -53,16 +53,16 @@ def regular(theta_i: Values, theta_o: Values, phi: Values, values: Values) -> tu
     around[around > TWO_PI - SAME] = 0.0
     whole = np.abs(phi - TWO_PI) < SAME
     known = ~whole if (around[~whole] < SAME).any() else np.ones(len(phi), bool)
-    axes, places = zip(*(_axis(angle[known]) for angle in (theta_i, theta_o, around)), strict=True)
-    shape = tuple(len(axis) for axis in axes)
+    (first, i), (second, j), (third, k) = (_axis(angle[known]) for angle in (theta_i, theta_o, around))
+    shape = len(first), len(second), len(third)
     if int(np.prod(shape)) != int(known.sum()):
         return None
-    flat = np.ravel_multi_index(places, shape)
+    flat = (i * shape[1] + j) * shape[2] + k
     if len(np.unique(flat)) < len(flat):
         return None
     found = np.empty((len(flat), *values.shape[1:]))
     found[flat] = values[known]
-    return (axes[0], axes[1], axes[2]), found.reshape(*shape, *values.shape[1:])
+    return (first, second, third), found.reshape(*shape, *values.shape[1:])
 
 
 def _axis(angles: Values) -> tuple[Values, NDArray[np.intp]]:

@@ -105,7 +105,8 @@ def _npz(path: Path, arrays: Mapping[str, NDArray[Any]], member: str) -> NeuralB
     if names == [""]:
         found = ", ".join(f"{visible(name)} {array.shape}" for name, array in list(arrays.items())[:8])
         raise FormatError(
-            f"{path}: expected columns of samples, arrays {', '.join(ARRAYS)}, or of {WEIGHTS} weights each, found {found}"
+            f"{path}: expected columns of samples, arrays {', '.join(ARRAYS)}, or of {WEIGHTS} weights each, "
+            f"found {found}"
         )
     if not member and len(names) > 1:
         raise FormatError(f"{path}: expected the name of one of its {len(names)} materials, as {path}:{names[0]}")
@@ -141,7 +142,10 @@ def network(path: Path, arrays: Mapping[str, NDArray[Any]]) -> NeuralBrdf:
         if len(layers) == len(SHAPES) and set(found) == set(shapes):
             ordered = [part for shape in shapes for part in found[shape]]
             return _layers(dict(zip(ARRAYS, ordered, strict=True)), visible(path.name.split(".")[0] or path.stem))
-    shown = ", ".join(f"{visible(place, LONGEST_NAME)} {array.shape}" for place, array in list(arrays.items())[:12]) or "none"
+    shown = (
+        ", ".join(f"{visible(place, LONGEST_NAME)} {array.shape}" for place, array in list(arrays.items())[:12])
+        or "none"
+    )
     raise FormatError(
         f"{path}: expected dense layers with matrices {SHAPES}, or transposed, and their biases, found {shown}"
     )
@@ -162,14 +166,14 @@ def in_archive(path: Path, data: bytes) -> bytes | None:
     names = numpy_files.names(path, data)
     if any(name.rpartition("/")[2].endswith(".pkl") for name in names):
         raise FormatError(
-            f"{path}: expected weights or samples, found a pickle as PyTorch writes it, which could run programs and is never "
-            "read: save the state dict with safetensors"
+            f"{path}: expected weights or samples, found a pickle as PyTorch writes it, which could run programs "
+            "and is never read: save the state dict with safetensors"
         )
     return numpy_files.member(path, data, KERAS, LARGEST_FILE) if KERAS in names else None
 
 
 def _keras(path: Path, data: bytes) -> dict[str, NDArray[Any]]:
-    """The arrays of the layers in a Keras model, by their path: kernel and bias, or, since Keras 3, vars/0 and vars/1."""
+    """The arrays of the layers in a Keras model, by path: kernel and bias, or, since Keras 3, vars/0 and vars/1."""
     return hdf5.arrays(path, data, "model_weights", _is_weight, WEIGHTS)
 
 

@@ -15,7 +15,8 @@ MOST_DROPPED = 0.25
 @dataclass(frozen=True)
 class Reading:
     """columns: the names of all columns in their order, in place of those in the file; empty to take these.
-    max_dropped: the largest share of the rows that may be left out, since they hold no numbers or lie below the horizon.
+    max_dropped: the largest share of the rows that may be left out, since they hold no numbers or lie below the
+    horizon.
 
     Raises OptionError for a share that is none.
     """
@@ -28,7 +29,8 @@ class Reading:
             raise OptionError(f"max_dropped: expected a share from 0 to 1, found {self.max_dropped:g}")
 
 
-_asked: ContextVar[Reading] = ContextVar("reading", default=Reading())
+AS_IT_IS = Reading()
+_asked: ContextVar[Reading] = ContextVar("reading", default=AS_IT_IS)
 
 
 def asked() -> Reading:

@@ -7,9 +7,24 @@ from pathlib import Path
 
 from ..system.errors import FormatError
 from . import (
-    alta, astm, cornell, fbrdf, fits, mbsdf, merl, nbrdf, numpy_materials, rgl, samples, scene, smrl, smrlib, source_code, xompt,
+    alta,
+    astm,
+    cornell,
+    fbrdf,
+    fits,
+    mbsdf,
+    merl,
+    nbrdf,
+    numpy_materials,
+    rgl,
+    samples,
+    scene,
+    smrl,
+    smrlib,
+    source_code,
+    xompt,
     zemax,
-)  # fmt: skip
+)
 from .format import Format
 
 # In the order in which help and docs list them.

@@ -1,5 +1,5 @@
-"""Small arrays from safetensors files (Hugging Face, format 0.3+): 8 bytes, the length of a JSON header, which gives each
-tensor's type, shape and place; then the bytes of all.
+"""Small arrays from safetensors files (Hugging Face, format 0.3 and later): 8 bytes, the length of a JSON header, which
+gives each tensor's type, shape and place; then the bytes of all.
 
 No package is needed, and nothing is executed.
 """
@@ -57,7 +57,9 @@ def _tensor(path: Path, name: str, about: Any, data: bytes, start: int, most: in
         raise FormatError(f"{path}: {name}: expected dtype, shape and data_offsets, found others")
     size = math.prod(cast("list[int]", shape))
     if kind not in TYPES or not 1 <= size <= most:
-        raise FormatError(f"{path}: {name}: expected at most {most} weights of {', '.join(TYPES)}, found {shape} of {kind}")
+        raise FormatError(
+            f"{path}: {name}: expected at most {most} weights of {', '.join(TYPES)}, found {shape} of {kind}"
+        )
     first, last = cast("list[int]", offsets)
     dtype = np.dtype(TYPES[kind])
     if last - first != size * dtype.itemsize or start + last > len(data):

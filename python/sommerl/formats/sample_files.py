@@ -50,4 +50,3 @@ def write_grid(brdf: Brdf, path: Path) -> Brdf:
     """Writes a BRDF at the directions of a grid, and returns it."""
     write(at_directions(brdf, grid_of(brdf)), path)
     return brdf
-

@@ -1,8 +1,8 @@
 """Columns of numbers in text files, as people and instruments write them.
 
-The first line in which at least two cells name angles has the names; what stands before it is a preamble, with or without "#". A row
-of units may follow. Commas, semicolons, tabs, bars or spaces separate columns; decimals may have commas where columns
-do not; exponents may have a D. Cells that are empty or say that nothing is known are NaN.
+The first line in which at least two cells name angles has the names; what stands before it is a preamble, with or
+without "#". A row of units may follow. Commas, semicolons, tabs, bars or spaces separate columns; decimals may have
+commas where columns do not; exponents may have a D. Cells that are empty or say that nothing is known are NaN.
 """
 
 from __future__ import annotations
@@ -150,7 +150,9 @@ def _first_row(
 def _split(line: str, delimiter: str | None) -> list[str]:
     if delimiter is None:
         return line.split()
-    cells = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), []) if '"' in line else line.split(delimiter)
+    cells: list[str] = line.split(delimiter)
+    if '"' in line:
+        cells = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
     return [cell.strip() for cell in cells]
 
 
@@ -219,7 +221,7 @@ def _nameless(path: Path, lines: Sequence[str]) -> str:
         plain = line.strip()
         if plain and not plain.startswith("#"):
             return (
-                f"{path}: line {number}: expected the names of columns, as theta_i_deg, phi_i_deg, theta_o_deg, phi_o_deg, "
-                f"r, g, b (or --columns with the names of all), found {plain[:60]!r}"
+                f"{path}: line {number}: expected the names of columns, as theta_i_deg, phi_i_deg, theta_o_deg, "
+                f"phi_o_deg, r, g, b (or --columns with the names of all), found {plain[:60]!r}"
             )
     return f"{path}: expected the names of columns, as theta_i_deg, found no line"

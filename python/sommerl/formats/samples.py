@@ -1,7 +1,7 @@
-"""Tables of samples: what a gonioreflectometer gives. CSV files and other text, and NumPy arrays with the same columns.
+"""Tables of samples: what a gonioreflectometer gives. CSV and other text, and NumPy arrays with the same columns.
 
-Columns, in any order, by names of many kinds (`columns`): the polar angle θ of light and viewer, their azimuths φ or the
-one between them, and f_r [1/sr]: linear RGB, CIE XYZ, a spectrum, or one grey value. Others are ignored. Angles say
+Columns, in any order, by names of many kinds (`columns`): the polar angle θ of light and viewer, their azimuths φ or
+the one between them, and f_r [1/sr]: linear RGB, CIE XYZ, a spectrum, or one grey value. Others are ignored. Angles say
 their unit, or it is found from their range. Rows without numbers and below the horizon are left out and counted. A
 .npy file holds an array with these names as fields, or one of shape (n, 7), θ_i, φ_i, θ_o, φ_o, r, g, b; an .npz file
 an array for each name.
@@ -114,9 +114,7 @@ def _known(names: Sequence[str]) -> list[int]:
     return [place for place, name in enumerate(names) if columns.column(name)]
 
 
-def of_arrays(
-    path: Path, arrays: Mapping[str, NDArray[Any]]
-) -> tuple[Columns, list[str], Callable[[int], str], str]:
+def of_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> tuple[Columns, list[str], Callable[[int], str], str]:
     """The columns in arrays, by their names. Raises FormatError."""
     known: Columns = []
     for name, values in arrays.items():
@@ -202,9 +200,7 @@ def _angles(
     return four, how, plane
 
 
-def _roles(
-    known: Columns, names: Sequence[str], header: str
-) -> dict[str, tuple[str, str, NDArray[np.float64]]]:
+def _roles(known: Columns, names: Sequence[str], header: str) -> dict[str, tuple[str, str, NDArray[np.float64]]]:
     """The columns of angles by what they are: name, unit, numbers."""
     found: dict[str, tuple[str, str, NDArray[np.float64]]] = {}
     for name, each, numbers in known:
@@ -216,18 +212,19 @@ def _roles(
     if "phi_i" in found and "phi_o" not in found and "dphi" in found:
         found["phi_o"] = found.pop("dphi")  # beside an azimuth of the light, `phi` is the viewer's
     if "phi_o" in found and "dphi" in found:
-        raise FormatError(f"phi: expected one azimuth of the viewer, found {found['phi_o'][0]}, {found['dphi'][0]}{header}")
+        raise FormatError(
+            f"phi: expected one azimuth of the viewer, found {found['phi_o'][0]}, {found['dphi'][0]}{header}"
+        )
     missing = [role for role in ("theta_i", "theta_o") if role not in found]
     if missing:
         raise FormatError(
-            f"expected columns {WANTED}, found none for {', '.join(missing)} in {', '.join(names)}{header} (--columns names them)"
+            f"expected columns {WANTED}, found none for {', '.join(missing)} in {', '.join(names)}{header} "
+            "(--columns names them)"
         )
     return found
 
 
-def _values(
-    known: Columns, names: Sequence[str], header: str
-) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
+def _values(known: Columns, names: Sequence[str], header: str) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
     """The columns of values (n, m), f_r in linear RGB (n, 3), and what they were, for people."""
     of_role: dict[str, Columns] = {}
     for each in known:
@@ -256,7 +253,8 @@ def _values(
         some = ", ".join(role for role in (*RGB, *XYZ) if role in of_role)
         found = f"two, {grey[0][0]} and {grey[1][0]}," if len(grey) > 1 else f"{some} alone" if some else "none"
         raise FormatError(
-            f"expected columns of values ({'; '.join(VALUES)}), found {found} in {', '.join(names)}{header} (--columns names them)"
+            f"expected columns of values ({'; '.join(VALUES)}), found {found} in {', '.join(names)}{header} "
+            "(--columns names them)"
         )
     values = _scaled(grey)
     factor = grey[0][1].role == FACTOR
@@ -278,17 +276,18 @@ def _kept(
     empty = ~(np.isfinite(angles).all(axis=1) & np.isfinite(values).all(axis=1))
     below = ~empty & (np.maximum(angles[:, 0], angles[:, 2]) > HORIZON)
     dropped = {"without_numbers": int(empty.sum()), "below_the_horizon": int(below.sum())}
-    share = (empty | below).mean()
+    left_out: NDArray[np.bool_] = np.asarray(empty | below)
+    share = float(left_out.mean())
     if share > asked().max_dropped:
-        first = int(np.argmax(empty | below))
+        first = int(np.argmax(left_out))
         column = next((name for name, _, numbers in known if not np.isfinite(numbers[first])), "")
-        what = f"column {column}: no finite number" if empty[first] else "below the horizon"
+        what = f"column {column}: no finite number" if column else "below the horizon"
         raise FormatError(
-            f"expected at most {asked().max_dropped:.0%} of the rows to be left out (--max-dropped), found {share:.0%}: "
-            f"{dropped['without_numbers']} without numbers, {dropped['below_the_horizon']} below the horizon, "
-            f"the first in {where(first)} ({what})"
+            f"expected at most {asked().max_dropped:.0%} of the rows to be left out (--max-dropped), found "
+            f"{share:.0%}: {dropped['without_numbers']} without numbers, {dropped['below_the_horizon']} below the "
+            f"horizon, the first in {where(first)} ({what})"
         )
-    return ~(empty | below), dropped
+    return ~left_out, dropped
 
 
 FORMAT = Format(

@@ -120,8 +120,8 @@ def to_rgb(values: NDArray[np.float64], wavelengths: NDArray[np.float64]) -> NDA
 # IEC 61966-2-1, from CIE XYZ whose white, D65, has Y = 1.
 FROM_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 
-# Reflectance spectra of linear sRGB's primaries, at every 20 nm: the smoothest ones (least squares of the differences of
-# neighbours) from 0 to 1 that are 1 in sum and that `srgb_weights` takes back to the primaries, within 3·10⁻⁷.
+# Reflectance spectra of linear sRGB's primaries, at every 20 nm: the smoothest ones (least squares of the differences
+# of neighbours) from 0 to 1 that are 1 in sum and that `srgb_weights` takes back to the primaries, within 3·10⁻⁷.
 WRITTEN = np.arange(390.0, 731.0, 20.0)
 PRIMARIES = np.array([
     (0.041368, 0, 0.958632),

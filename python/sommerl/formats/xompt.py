@@ -49,7 +49,8 @@ Table = NDArray[np.float64]
 
 def looks_like(head: bytes) -> bool:
     """Whether a file that starts with these bytes is JSON that speaks of OpenMATERIAL and of a BRDF."""
-    return head.lstrip().startswith(b"{") and b"openMaterial3dVersion" in head or b"material_brdf_schema" in head
+    said = b"openMaterial3dVersion" in head or b"material_brdf_schema" in head
+    return said and head.lstrip().startswith(b"{")
 
 
 def read(path: str | Path) -> Brdf:
@@ -67,10 +68,12 @@ def parse(path: Path, file: door.File) -> Brdf:
     directions, spectra, wavelengths, facts = _spectra(path, rows)
     f_r = to_rgb(spectra, wavelengths * 1e9)
     named: dict[str, Any] = {"name": visible(path.stem), "source_sha256": digest.hexdigest()}
-    found = regular(*directions.T, f_r)
+    theta_i, theta_o, phi = directions.T
+    found = regular(theta_i, theta_o, phi, f_r)
     try:
         if found:
-            return GridBrdf(*found[0], found[1], facts=facts, **named)
+            axes, values = found
+            return GridBrdf(*axes, values, facts=facts, **named)
         angles = np.insert(directions, 1, 0.0, axis=1)  # φ_i
         table = to_table(Samples.at_angles(angles, f_r), **named)
     except (FormatError, MaterialError) as error:
@@ -151,8 +154,8 @@ def _spectra(path: Path, rows: Table) -> tuple[Table, Table, Table, Mapping[str,
     if not len(rows) or 1 - above.mean() > asked().max_dropped:
         found = f"{len(rows) - int(above.sum())} of {len(rows)}"
         raise FormatError(
-            f"{path}: lookupTable: expected at most {asked().max_dropped:.0%} of the rows to be left out (--max-dropped), "
-            f"found {found} without numbers or below the horizon"
+            f"{path}: lookupTable: expected at most {asked().max_dropped:.0%} of the rows to be left out "
+            f"(--max-dropped), found {found} without numbers or below the horizon"
         )
     kept = rows[above]
     wrong = (kept[:, 0] <= 0) | (kept[:, 1:3] < 0).any(axis=1) | (np.abs(kept[:, 3]) > 4 * np.pi + 1e-3)
@@ -166,7 +169,11 @@ def _spectra(path: Path, rows: Table) -> tuple[Table, Table, Table, Mapping[str,
     if np.abs(blocks[:, :, 1:4] - blocks[0, :, 1:4]).max() > 1e-6:
         raise FormatError(f"{path}: lookupTable: expected the same directions for each wavelength, found others")
     ends = f"{wavelengths[0] * 1e9:g} to {wavelengths[-1] * 1e9:g} nm"
-    text = f"{ends[: ends.index(' to')]} nm alone, as grey" if len(wavelengths) == 1 else f"{len(wavelengths)} wavelengths, {ends}"
+    text = (
+        f"{ends[: ends.index(' to')]} nm alone, as grey"
+        if len(wavelengths) == 1
+        else f"{len(wavelengths)} wavelengths, {ends}"
+    )
     facts = {"rows": len(rows), "values": text}
     dropped = {"rows_without_numbers": int((~known).sum()), "rows_below_the_horizon": int((known & ~above).sum())}
     return (

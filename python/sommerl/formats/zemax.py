@@ -97,7 +97,9 @@ def _head(path: Path, lines: Iterator[Line]) -> tuple[dict[str, str], dict[str, 
             head[name] = " ".join(rest)
             continue
         if not rest or not re.fullmatch(r"[0-9]{1,5}", rest[0]) or not 1 <= int(rest[0]) <= MOST_ANGLES:
-            raise FormatError(f"{path}: line {number}: {name}: expected 1 to {MOST_ANGLES}, found {' '.join(rest)[:40]!r}")
+            raise FormatError(
+                f"{path}: line {number}: {name}: expected 1 to {MOST_ANGLES}, found {' '.join(rest)[:40]!r}"
+            )
         axes[name] = _numbers(path, lines, int(rest[0]), name)
     if head.get("ScatterType", "") != "BRDF":
         raise FormatError(f"{path}: ScatterType: expected BRDF, found {head.get('ScatterType', 'none')}")

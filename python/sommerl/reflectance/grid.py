@@ -180,7 +180,8 @@ def _steps(axis: Values) -> NDArray[np.uint32]:
     angle at or before each step's beginning."""
     if len(axis) == 1:
         return np.zeros(1, np.uint32)
-    count = min(int(np.ceil((axis[-1] - axis[0]) / np.diff(axis).min())) + 1, MOST_STEPS)
+    smallest = float(np.diff(axis).min())
+    count = min(int((axis[-1] - axis[0]) / smallest) + 2, MOST_STEPS)
     begins = axis[0] + np.arange(count) * ((axis[-1] - axis[0]) / count)
     return np.minimum(np.searchsorted(axis, begins, side="right") - 1, len(axis) - 2).astype(np.uint32)
 
