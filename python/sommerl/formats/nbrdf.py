@@ -64,7 +64,7 @@ def members(arrays: Mapping[str, NDArray[Any]]) -> list[str]:
 
 def is_flat(array: NDArray[Any]) -> bool:
     """Whether an array is all weights of a network in a row, and not a table that has as many numbers."""
-    return array.size == WEIGHTS == max(array.shape, default=0) and array.dtype.kind == "f"
+    return array.size == WEIGHTS == max(array.shape, default=0)
 
 
 def parts(path: Path) -> list[Path]:

@@ -39,7 +39,7 @@ MOST_ROWS, MOST_WAVELENGTHS = 2**24, 4096
 HORIZON = np.pi / 2 + 1e-3
 COLUMNS = 5
 _TABLE = re.compile(rb'"lookupTable"\s*:\s*\[')
-_END = re.compile(rb"\A\s*\]|\]\s*\]")
+_END, _EMPTY = re.compile(rb"\]\s*\]"), re.compile(rb"\s*\]")
 _SPACED = bytes.maketrans(b"[],", b"   ")
 _SCHEMA = "https://raw.githubusercontent.com/asam-ev/OpenMATERIAL-3D/refs/tags/v1.0.0/schemas/material_brdf_schema.json"
 _MARK = "Written by Sommerl"
@@ -94,7 +94,7 @@ def _parts(path: Path, file: door.File, digest: Any) -> tuple[Table, bytes]:
             if found:
                 before, buffer = buffer[: found.end()] + b"]", buffer[found.end() :]
         if before and not after:
-            end = _END.search(buffer)
+            end = _END.search(buffer) or (None if rows else _EMPTY.match(buffer))
             cut = end.end() - 1 if end else buffer.rfind(b"]")
             rows.append(_rows(path, buffer[: max(cut, 0)]))
             after, buffer = (buffer[cut + 1 :] or b" ", b"") if end else (b"", buffer[max(cut, 0) :])

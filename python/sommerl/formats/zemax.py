@@ -150,13 +150,13 @@ def _one_turn(
     path: Path, values: NDArray[np.float64], azimuth: NDArray[np.float64], symmetry: str
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Values and azimuths without a second end of a full turn, and without what plane symmetry says again."""
+    if (np.diff(azimuth) <= 0).any() or azimuth[0] < 0:
+        raise FormatError(f"{path}: ScatterAzimuth: expected angles that increase from 0, found others")
     if len(azimuth) > 1 and azimuth[-1] - azimuth[0] > 360 - 1e-3:
         values, azimuth = values[:, :-1], azimuth[:-1]
     if symmetry.lower() == "planesymmetrical":
-        kept = azimuth <= 180 + 1e-3
+        kept = azimuth <= max(180.0, float(azimuth[0])) + 1e-3
         values, azimuth = values[:, kept], azimuth[kept]
-    if not len(azimuth) or (np.diff(azimuth) <= 0).any() or azimuth[0] < 0:
-        raise FormatError(f"{path}: ScatterAzimuth: expected angles that increase from 0, found others")
     return values, azimuth
 
 
