@@ -38,7 +38,7 @@ PARAMETERS = {
 def content(name, columns, values, output="INV_STERADIAN", head=""):
     rows = np.column_stack([*columns, values])
     head += f"#DIM {len(columns)} {values.shape[1]}\n#PARAM_IN {name}\n#PARAM_OUT {output}\n"
-    return "#SAMPLE \"x\"\n" + head + "\n".join(" ".join(f"{x:.12g}" for x in row) for row in rows) + "\n"
+    return '#SAMPLE "x"\n' + head + "\n".join(" ".join(f"{x:.12g}" for x in row) for row in rows) + "\n"
 
 
 def put(tmp_path, text, name="x.dat"):
@@ -83,7 +83,9 @@ def test_what_values_mean(tmp_path):
 
 def test_intervals_are_ignored(tmp_path):
     text = content("CARTESIAN", PARAMETERS["CARTESIAN"], F_R, head="#VS 2\n").replace("\n", " 7 8\n")
-    text = "".join(line.removesuffix(" 7 8") + "\n" if line.startswith("#") else line + "\n" for line in text.splitlines())
+    text = "".join(
+        line.removesuffix(" 7 8") + "\n" if line.startswith("#") else line + "\n" for line in text.splitlines()
+    )
     check_formula(alta.samples_of(put(tmp_path, text), text.encode()).samples)
 
 

@@ -137,9 +137,18 @@ def many_nan(count):
             r"theta_i_deg, theta_o_deg: expected degrees, found nothing above 1.4\d* \(line 2\) \(radians\?\)",
         ),
         (text(RADIANS, "1,2,3,4,5,6,7"), "line 1: expected the names of columns, .*--columns"),
-        (text(RADIANS, HEADER.replace("g", "r")), r"r: expected one column, found two \(line 1\)|g: expected|r, b alone"),
-        (text(RADIANS, HEADER.replace("phi_i", "theta_in")), "theta_i: expected one column, found two, theta_i and theta_in"),
-        (text(RADIANS, HEADER.replace("theta_i", "incident")), r"found none for theta_i in incident, phi_i, .*\(line 1\)"),
+        (
+            text(RADIANS, HEADER.replace("g", "r")),
+            r"r: expected one column, found two \(line 1\)|g: expected|r, b alone",
+        ),
+        (
+            text(RADIANS, HEADER.replace("phi_i", "theta_in")),
+            "theta_i: expected one column, found two, theta_i and theta_in",
+        ),
+        (
+            text(RADIANS, HEADER.replace("theta_i", "incident")),
+            r"found none for theta_i in incident, phi_i, .*\(line 1\)",
+        ),
         (damaged(3, 5, "x"), "line 5, column g: expected a number, found 'x'"),
         (damaged(3, 5, "1,2"), "line 5: expected 7 columns, found 8"),
         (text(RADIANS, HEADER)[:-30], "line 61: expected 7 columns"),

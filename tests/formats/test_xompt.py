@@ -28,7 +28,9 @@ def rows(angles=(THETA_I, THETA_O, PHI), spectra=SPECTRA):
 
 
 def content(table, indent=4, **more):
-    return json.dumps({"metadata": {"openMaterial3dVersion": "1.0.0"}, "brdf": {"lookupTable": table} | more}, indent=indent)
+    return json.dumps(
+        {"metadata": {"openMaterial3dVersion": "1.0.0"}, "brdf": {"lookupTable": table} | more}, indent=indent
+    )
 
 
 def put(tmp_path, text):
@@ -89,7 +91,16 @@ def test_written_and_read_again(capsys, tmp_path):
     assert result["cells_clamped"] == 0
     run_json(capsys, "convert", "nickel", path)  # Sommerl may replace its own
     found = json.loads(path.read_text())
-    metadata = ("name", "uuid", "materialVersion", "openMaterial3dVersion", "copyrights", "license", "authors", "sources")
+    metadata = (
+        "name",
+        "uuid",
+        "materialVersion",
+        "openMaterial3dVersion",
+        "copyrights",
+        "license",
+        "authors",
+        "sources",
+    )
     assert set(metadata) <= found["metadata"].keys()
     table = np.array(found["brdf"]["lookupTable"])
     assert (np.lexsort(table[:, 3::-1].T) == np.arange(len(table))).all()
