@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers import must_fail, run, run_json
+from helpers import PATIENCE, must_fail, run, run_json
 
 import sommerl
 from sommerl import NAMES, BrdfTable, Lattice, load
@@ -402,7 +402,7 @@ def test_interrupting_leaves_no_file(tmp_path):
     time.sleep(5)
     assert process.poll() is None
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=PATIENCE)
     assert (process.returncode, out) == (130, "")
     assert err == "error: interrupted; nothing was left half-written\n"
     assert list(tmp_path.iterdir()) == []
