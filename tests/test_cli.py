@@ -5,7 +5,6 @@ import subprocess
 import sys
 import time
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -372,15 +371,6 @@ def test_a_folder_does_not_hide_a_builtin(capsys, tmp_path, monkeypatch):
     (tmp_path / "chrome").mkdir()
     info = run_json(capsys, "info", "chrome")
     assert (info["kind"], info["bytes_disk"]) == ("model", None)
-
-
-def test_the_readmes_example_runs(tmp_path, monkeypatch, capsys):
-    readme = (Path(__file__).parent.parent / "README.md").read_text()
-    example = readme.split("```python\n")[1].split("```")[0]
-    monkeypatch.chdir(tmp_path)
-    exec(example.replace("clusters=256", "clusters=16, epochs=1").replace("2700", "400"), {})
-    assert (tmp_path / "nickel.smrl").exists()
-    assert len(capsys.readouterr().out.splitlines()) == 3
 
 
 def start(*arguments, **options):
