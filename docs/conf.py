@@ -2,17 +2,17 @@
 
 import argparse
 import os
-import tomllib
 from pathlib import Path
 from typing import Any
 
+from sommerl import __version__
 from sommerl.commands.cli import parser
 
 HERE = Path(__file__).parent
 COLUMNS = "90"  # of what `--help` prints
 
 project = author = "Sommerl"
-release = version = tomllib.loads((HERE.parent / "pyproject.toml").read_text("utf-8"))["project"]["version"]
+release = version = __version__
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build", "notebooks", "results"]
