@@ -1,5 +1,8 @@
 """What the pages show works: every command is one that there is, and every example in Python runs."""
 
+import doctest
+import functools
+import io
 import re
 import shlex
 import shutil
@@ -81,3 +84,37 @@ def test_examples_run(made, tmp_path, monkeypatch, example):
 
 def test_there_are_examples():
     assert len(EXAMPLES) >= 5
+
+
+PUBLIC = [name for name in sommerl.__all__ if callable(getattr(sommerl, name))]
+METHODS = ["Brdf.eval", "Brdf.sample", "Brdf.pdf", "Brdf.albedo", "Brdf.info"]
+
+
+def check_shown(thing, name):
+    """An object's own docstring has examples, and they are right."""
+    (shown,) = doctest.DocTestFinder(recurse=False).find(thing, name, globs={"sommerl": sommerl, **vars(sommerl)})
+    assert shown.examples, name
+    said = io.StringIO()
+    failed, _ = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE).run(shown, out=said.write)
+    assert not failed, said.getvalue()
+
+
+@pytest.mark.parametrize("name", [*PUBLIC, *METHODS])
+def test_docstrings_have_examples_that_run(made, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(shutil.copytree(made, tmp_path / "here"))
+    thing = functools.reduce(getattr, name.split("."), sommerl)
+    check_shown(thing, name)
+
+
+def test_wrong_examples_are_noticed():
+    def none():
+        """Nothing."""
+
+    def wrong():
+        """
+        >>> 1 + 1
+        3
+        """
+
+    for each in (none, wrong):
+        must_fail(check_shown, each, "wrong")
