@@ -177,7 +177,17 @@ def test_fused_multiply_add_and_no_exceptions_change_nothing(tmp_path):
 STANDARD = "".join(re.findall("#include <.*>\n", (ROOT / "include" / "sommerl.hpp").read_text()))
 HOSTILE = "\n".join(
     f"#define {name}"
-    for name in ("min(a, b) broken", "max(a, b) broken", "PI 3", "real half", "near", "far", "small char", "None 0L", "Bool int")
+    for name in (
+        "min(a, b) broken",
+        "max(a, b) broken",
+        "PI 3",
+        "real half",
+        "near",
+        "far",
+        "small char",
+        "None 0L",
+        "Bool int",
+    )
 )
 OWN_VECTOR = """
 #include "sommerl.hpp"
