@@ -1,4 +1,4 @@
-"""include/sommerl.hpp refuses what Python refuses, with an error code; nothing that it reads makes it do what is undefined."""
+"""include/sommerl.hpp refuses what Python refuses, with an error code, and does nothing that is undefined."""
 
 import struct
 import zlib
@@ -116,23 +116,55 @@ def with_notes(notes):
 NODES = file.encode(compact.material((2, 1, 3, 3, "walk"), 4))[PREFIX.size + 9 :]
 
 
+NOTES = r"""
+{}
+ { }
+[]
+1
+{
+{}}
+{"a":1,}
+{"a" 1}
+{"options":{}}
+{"options":[]}
+{"options":null}
+{"options":{"a":[1]}}
+{"options":{"a":true,"b":null,"c":-1.5e-7}}
+{"metrics":{"a":{}}}
+{"options":{"source_facts":{"a":1}}}
+{"metrics":{"source_facts":{"a":1}}}
+{"options":{"source_facts":{"a":{}}}}
+{"options":{"source_facts":1}}
+{"a":NaN}
+{"a":Infinity}
+{"a":1e400}
+{"a":1e-400}
+{"a":01}
+{"a":1.}
+{"a":.5}
+{"a":1e}
+{"a":-}
+{"a":+1}
+{"options":{"a":1e301}}
+{"options":{"a":1e299}}
+{"a":"\u12g4"}
+{"a":"\x"}
+{"a":"\u00e4\n"}
+{"a":"ä"}
+{"a":tru}
+nul
+"""
+
+
 def test_notes():
-    text = lambda number: '"' + "x" * number + '"'  # noqa: E731
     many = ",".join(f'"{n}":1' for n in range(65))
-    notes = [
-        "", "{}", " { } ", "[]", "1", "{", "{}}", '{"a":1,}', '{"a" 1}', '{"options":{}}', '{"options":[]}', '{"options":null}',
-        '{"options":{"a":[1]}}', '{"options":{"a":true,"b":null,"c":-1.5e-7}}', '{"metrics":{"a":{}}}', '{"options":{"source_facts":{"a":1}}}',
-        '{"metrics":{"source_facts":{"a":1}}}', '{"options":{"source_facts":{"a":{}}}}', '{"options":{"source_facts":1}}',
-        '{"a":NaN}', '{"a":Infinity}', '{"a":1e400}', '{"a":1e-400}', '{"a":01}', '{"a":1.}', '{"a":.5}', '{"a":1e}', '{"a":-}', '{"a":+1}',
-        '{"options":{"a":1e301}}', '{"options":{"a":1e299}}', '{"a":"\\u12g4"}', '{"a":"\\x"}', '{"a":"\\u00e4\\n"}', '{"a":"\n"}', '{"a":"ä"}',
-        f'{{"options":{{"a":{text(1000)}}}}}', f'{{"options":{{"a":{text(1001)}}}}}', f'{{"options":{{{text(100)}:1}}}}',
-        f'{{"options":{{{text(101)}:1}}}}', f'{{"options":{{{many}}}}}', f'{{"metrics":{{{many[: many.rindex(",")]}}}}}',
-        '{"a":' + "[" * 31 + "]" * 31 + "}", '{"a":' + "[" * 32 + "]" * 32 + "}", '{"a":tru}', "\ufeff{}", "{}\0", "nul",
-    ]  # fmt: skip
-    files = [with_notes(each.encode()) for each in notes] + [
-        with_notes(b'{"a":"\xff"}'),
-        with_notes(b'{"a":"\xed\xa0\x80"}'),
-    ]
+    notes = NOTES.splitlines()
+    notes += ['{"options":{"a":"%s"}}' % ("x" * count) for count in (1000, 1001)]
+    notes += ['{"options":{"%s":1}}' % ("x" * count) for count in (100, 101)]
+    notes += ['{"options":{' + each + "}}" for each in (many, many[: many.rindex(",")])]
+    notes += ['{"a":' + "[" * count + "]" * count + "}" for count in (31, 32)]
+    files = [with_notes(each.encode()) for each in (*notes, '{"a":"\n"}', "\ufeff{}", "{}\0")]
+    files += [with_notes(b'{"a":"%s"}' % some) for some in (b"\xff", b"\xed\xa0\x80", b"\xc0\x80", b"\xf4\x90\x80\x80")]
     found = codes(probe(), files)
     check_refuses_like_python(found, files, file.decode)
     assert set(found) == {"none", "notes"}
