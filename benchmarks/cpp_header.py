@@ -1,12 +1,12 @@
-"""How fast is include/sommerl.hpp? Ratios of times, peer : ours, from one interleaved run on one thread.
+"""How fast is include/sommerl.hpp? Ratios of CPU times, peer : ours, from one interleaved run.
 
     uv run python benchmarks/cpp_header.py POWITACQ FILE.bsdf FILE.binary [--bytes 8000] [--rounds 9]
         [--flags=-O3,-march=native] [--json FILE]
 
 POWITACQ is powitacq_rgb.h of rgl-epfl/brdf-loader, with its .inl beside it. FILE.bsdf, a material of RGL's in RGB, is
 what it reads, and is compressed to a compact material of so many bytes for us; FILE.binary, a table of MERL's kind, is
-looked up as it is, and is compressed by the preset paper for us. All get the same 100,000 pairs of directions. `load`
-reads a file and makes it ready for `eval`; our sampler is fitted when it is first asked for, which `load and sample`
+looked up as it is, and is compressed by the preset paper for us. All get the same 100,000 pairs of directions, on one
+thread. `load` reads a file and makes it ready for `eval`; our sampler is fitted when it is first asked for, which `load and sample`
 has, too. Prints the lines of the headers, too.
 """
 
