@@ -6,8 +6,8 @@
 POWITACQ is powitacq_rgb.h of rgl-epfl/brdf-loader, with its .inl beside it. FILE.bsdf, a material of RGL's in RGB, is
 what it reads, and is compressed to a compact material of so many bytes for us; FILE.binary, a table of MERL's kind, is
 looked up as it is, and is compressed by the preset paper for us. All get the same 100,000 pairs of directions, on one
-thread. `load` reads a file and makes it ready for `eval`; our sampler is fitted when it is first asked for, which `load and sample`
-has, too. Prints the lines of the headers, too.
+thread. `load` reads a file and makes it ready for `eval`; our sampler is fitted when it is first asked for, which `load
+and sample` has, too. Prints the lines of the headers, too.
 """
 
 from __future__ import annotations
