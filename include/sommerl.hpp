@@ -886,7 +886,10 @@ inline std::vector<std::uint16_t> above_horizon(const Material& material) {
     return counts;
 }
 
-template <class Entry> bool fill_cells(const Material& material, const std::vector<std::uint16_t>& above, const std::uint8_t* entries, std::size_t clusters, std::vector<Entry>& index) {
+/// above: from `above_horizon`. entries: those of the cells above the horizon. Says whether all are below `clusters`.
+template <class Entry>
+bool fill_cells(const Material& material, const std::vector<std::uint16_t>& above, const std::uint8_t* entries, std::size_t clusters,
+                std::vector<Entry>& index) {
     const auto [a, b, c] = material.bins;
     index.resize(std::size_t(a) * b * c);
     for (std::size_t i = 0; i < a; ++i) {
@@ -935,7 +938,8 @@ inline Error read_cells(Reader& reader, Material& material) {
         material.palette.push_back(value);
     }
     const std::uint8_t* index = payload.data() + 24 * entries;
-    const bool fits = width == 1 ? fill_cells(material, above, index, entries, material.narrow) : fill_cells(material, above, index, entries, material.wide);
+    const bool fits = width == 1 ? fill_cells(material, above, index, entries, material.narrow)
+                                 : fill_cells(material, above, index, entries, material.wide);
     return fits ? Error::none : Error::contents;
 }
 
@@ -1052,8 +1056,8 @@ inline Error read_part(Bytes bytes, const Shared& shared, Material& material) {
     const std::uint64_t flags = reader.number(1);
     material.scale = reader.real();
     if (!reader.fine()) return Error::truncated;
-    const bool fits = number < shared.lattices.size() && (flags & ~std::uint64_t(12)) == 0 && material.scale > 0 && material.scale <= FLT_MAX;
-    if (!fits) return Error::contents;
+    if (number >= shared.lattices.size() || (flags & ~std::uint64_t(12)) != 0) return Error::contents;
+    if (!(material.scale > 0 && material.scale <= FLT_MAX)) return Error::contents;
     material.lattice = shared.lattices[number];
     material.reciprocal = material.lattice.reciprocal;
     material.mirrored = material.lattice.mirrored;
@@ -1087,7 +1091,7 @@ inline Error read_file(const std::string& path, std::uint64_t most, std::vector<
     return file ? Error::none : Error::file;
 }
 
-template <class Real> bool finite_or_nan_free(const Real (&a)[3], const Real (&b)[3]) {
+template <class Real> bool all_finite(const Real (&a)[3], const Real (&b)[3]) {
     // 0 if all are finite, else NaN.
     const Real all = (a[0] * 0 + a[1] * 0 + a[2] * 0) + (b[0] * 0 + b[1] * 0 + b[2] * 0);
     return all == 0;
@@ -1136,7 +1140,7 @@ public:
         for (const auto* part : {&material.f, &material.u, &material.v}) palette_.insert(palette_.end(), part->begin(), part->end());
     }
     void eval(const Triple& wi, const Triple& wo, Triple& out) const {
-        out[0] = out[1] = out[2] = finite_or_nan_free(wi, wo) ? Real(0) : std::numeric_limits<Real>::quiet_NaN();
+        out[0] = out[1] = out[2] = all_finite(wi, wo) ? Real(0) : std::numeric_limits<Real>::quiet_NaN();
         if (!(out[0] == 0 && wi[2] > 0 && wo[2] > 0)) return;
         if (material_->kind == Kind::nodes) nodes(wi, wo, out);
         else if (material_->kind == Kind::cells) cells(wi, wo, out);
@@ -1166,10 +1170,10 @@ private:
     }
     void prepare_nodes() {
         const Lattice& lattice = material_->lattice;
-        std::vector<std::uint32_t> base{0};
-        for (const auto b : lattice.band) base.push_back(base.back() + static_cast<std::uint32_t>(lattice.theta_d[b].size() * lattice.phi_d[b].size()));
+        base_.push_back(0);
+        for (const auto b : lattice.band)
+            base_.push_back(base_.back() + static_cast<std::uint32_t>(lattice.theta_d[b].size() * lattice.phi_d[b].size()));
         rows_ = steps(lattice.theta_h, [&](std::size_t row) { return static_cast<std::uint32_t>(row); });
-        base_ = base;
         for (std::size_t b = 0; b < lattice.theta_d.size(); ++b) {
             const auto width = static_cast<std::uint32_t>(lattice.phi_d[b].size());
             bands_.push_back(steps(lattice.theta_d[b], [&](std::size_t node) { return static_cast<std::uint32_t>(node) * width; }));
@@ -1367,15 +1371,16 @@ private:
             for (std::size_t point = 0; point < points; ++point) {
                 const std::size_t i = cell / columns * finer + point / finer, j = cell % columns * finer + point % finer;
                 double wi[3], solid_angle, f_r[3];
-                mirrored((double(i) + 0.5) / double(finer * rows), 2 * ((double(j) + 0.5) / double(finer * columns)), 1.0, wo, wi, solid_angle);
+                const double s = (double(i) + 0.5) / double(finer * rows), c = 2 * ((double(j) + 0.5) / double(finer * columns));
+                mirrored(s, c, 1.0, wo, wi, solid_angle);
                 const double cosine = (wi[2] > 0 ? wi[2] : 0) * solid_angle;
                 lookup.eval(wi, wo, f_r);
                 made.even[cell] += cosine / double(points);
-                for (std::size_t c = 0; c < 3; ++c) {
-                    const double value = f_r[c] * cosine;
+                for (std::size_t n = 0; n < 3; ++n) {
+                    const double value = f_r[n] * cosine;
                     made.rms[cell] += value * value;
-                    total[c] += value;
-                    brightest[cell][c] = point == 0 || value > brightest[cell][c] ? value : brightest[cell][c];
+                    total[n] += value;
+                    brightest[cell][n] = point == 0 || value > brightest[cell][n] ? value : brightest[cell][n];
                 }
             }
             made.rms[cell] = std::sqrt(made.rms[cell] / double(3 * points));
@@ -1510,7 +1515,8 @@ private:
     Error read_index(detail::Bytes bytes, bool shares) {
         using namespace detail;
         Reader head(bytes);
-        const std::uint64_t n = head.number(4), k = head.number(1), common = head.number(4), names = head.number(4), sources = head.number(4);
+        const std::uint64_t n = head.number(4), k = head.number(1);
+        const std::uint64_t common = head.number(4), names = head.number(4), sources = head.number(4);
         if (!head.fine()) return Error::truncated;
         const std::uint64_t size = (65 + 4 * k) * n + common + names + sources;
         if (size > std::uint64_t(1) << 28 || size > 64 * std::uint64_t(bytes_.size()) || common > 1 << 20) return Error::contents;
@@ -1521,7 +1527,8 @@ private:
         const auto column = [&](std::size_t width) { return reader.take(width * count); };
         const auto at = [](Bytes of, std::size_t i, std::size_t width) { return Reader(of.part(i * width, width)).number(width); };
         const Bytes name_lengths = column(2), source_lengths = column(2), lengths = column(4), crcs = column(4), kinds = column(1);
-        const Bytes options = column(2), source_bytes = column(8), digests = column(32), looks = column(10), values = column(4 * static_cast<std::size_t>(k));
+        const Bytes options = column(2), source_bytes = column(8), digests = column(32), looks = column(10);
+        const Bytes values = column(4 * static_cast<std::size_t>(k));
         std::vector<std::string> sets;
         if (!read_common(reader.take(static_cast<std::size_t>(common)).text(), static_cast<std::size_t>(k), sets)) return Error::notes;
         Reader name_texts(reader.take(static_cast<std::size_t>(names))), source_texts(reader.take(static_cast<std::size_t>(sources)));
@@ -1637,7 +1644,7 @@ public:
     Vector sample(const Vector& wo, const Vector& u, Vector* wi, Real* pdf) const {
         const Real viewer[3] = {wo[0], wo[1], wo[2]}, numbers[3] = {u[0], u[1], u[2]};
         Real light[3] = {0, 0, 1}, f_r[3] = {}, density = 0;
-        bool known = detail::finite_or_nan_free(viewer, numbers);
+        bool known = detail::all_finite(viewer, numbers);
         for (const Real number : numbers) known = known && number >= 0 && number <= 1;
         if (known && viewer[2] > 0 && state_) density = finite(state_->sampler().draw(viewer, numbers, light));
         if (!(density > 0)) density = light[0] = light[1] = 0, light[2] = 1;
@@ -1650,7 +1657,7 @@ public:
     /// The density [1/sr] with which `sample` draws wi for wo. NaN and 0 as in `eval`.
     Real pdf(const Vector& wi, const Vector& wo) const {
         const Real a[3] = {wi[0], wi[1], wi[2]}, b[3] = {wo[0], wo[1], wo[2]};
-        if (!detail::finite_or_nan_free(a, b)) return std::numeric_limits<Real>::quiet_NaN();
+        if (!detail::all_finite(a, b)) return std::numeric_limits<Real>::quiet_NaN();
         if (!(a[2] > 0 && b[2] > 0 && state_)) return 0;
         const Real found = finite(state_->sampler().density(a, b));
         return found > 0 ? found : 0;
@@ -1683,7 +1690,8 @@ private:
     };
     static Real finite(Real x) { return x != x ? Real(0) : x > Real(FLT_MAX) ? Real(FLT_MAX) : x < Real(-FLT_MAX) ? Real(-FLT_MAX) : x; }
     static Error parse(detail::Bytes bytes, detail::Material& material) {
-        return bytes.size >= 4 && bytes.part(0, 4).text() == "FBRD" ? detail::read_fbrdf(bytes, material) : detail::read_smrl(bytes, material);
+        const bool factored = bytes.size >= 4 && bytes.part(0, 4).text() == "FBRD";
+        return factored ? detail::read_fbrdf(bytes, material) : detail::read_smrl(bytes, material);
     }
     template <class Read> static BasicBrdf made(Read read) {
         BasicBrdf brdf;
