@@ -18,7 +18,7 @@ from ..system import door
 from ..system.errors import FormatError
 from ..system.visible import visible
 from .format import Format
-from .scattered import to_table
+from .scattered import from_samples
 from .spectra import srgb_weights
 from .text import LARGEST_FILE, rows, text_of, uncommented
 
@@ -55,7 +55,7 @@ def parse(path: Path, data: bytes) -> BrdfTable:
         raise FormatError(f"{path}: wavelengths: expected {count} that increase [nm], found {len(nanometres)} others")
     samples = rows(path, lines[start:], 4 + count)
     try:
-        return to_table(
+        return from_samples(
             Samples.at_angles(samples[:, :4], samples[:, 4:] @ srgb_weights(nanometres)),
             name=visible(path.stem),
             source_sha256=hashlib.sha256(data).hexdigest(),

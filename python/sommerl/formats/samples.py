@@ -23,7 +23,7 @@ from ..system.errors import FormatError
 from ..system.visible import visible
 from . import numpy_files
 from .format import Format
-from .scattered import to_table
+from .scattered import from_samples
 from .text import LARGEST_FILE, rows, text_of, uncommented
 
 ANGLES = ("theta_i", "phi_i", "theta_o", "phi_o")
@@ -59,7 +59,7 @@ def parse(path: Path, data: bytes) -> BrdfTable:
         columns = _text(path, data)
     try:
         samples = _samples(columns)
-        return to_table(samples, name=visible(path.stem), source_sha256=hashlib.sha256(data).hexdigest())
+        return from_samples(samples, name=visible(path.stem), source_sha256=hashlib.sha256(data).hexdigest())
     except FormatError as error:
         raise FormatError(f"{path}: {error}") from error
 
