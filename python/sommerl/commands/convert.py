@@ -12,7 +12,7 @@ from ..compression.paper.options import TrainOptions
 from ..formats import registry, rgl, rgl_export, smrl
 from ..formats.format import Format
 from ..formats.load import load
-from ..formats.scattered import ScatteredTable
+from ..formats.scattered import ScatteredBrdf
 from ..models.builtin import NAMES, builtin_table
 from ..plots import coverage
 from ..reflectance.brdf import Brdf
@@ -184,7 +184,7 @@ def _report(brdf: Brdf, output: Path) -> dict[str, Any]:
     """What the reader reports of the data; of samples, a picture of where none were measured is written, too."""
     facts = brdf.facts
     result: dict[str, Any] = {"facts": facts} if facts else {}
-    if isinstance(brdf, ScatteredTable):
+    if isinstance(brdf, ScatteredBrdf):
         result["coverage"] = facts["coverage"]
         picture = output.with_name(f"{output.stem}.coverage.png")
         check_output(picture, (".png",))

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from ..reflectance.distance import LOG_FLOOR
 from ..reflectance.samples import Samples
-from .regression import NEIGHBOURS, RINGS, Regression, Ring
+from .regression import NEIGHBOURS, RINGS, Regression, Ring, drawn
 
 HELD_OUT = 10  # one sample in so many tests the others
 MOST_HELD_OUT = 2000
-MOST_TRIED = 200_000  # samples that are tried on; of more, some drawn at random
+MOST_TRIED = 100_000  # samples that are tried on; of more, some drawn at random
 LINE = np.radians(0.25)  # samples whose θ_i differ by less are of one line of incidence
 LEAST_OF_LINE = 8  # samples; fewer are no line
 ONE_SIDED = 0.8  # of the error that is left otherwise: a lattice of both orders takes twice as many nodes
@@ -61,9 +61,7 @@ def chosen(samples: Samples, both_sides: BothSides) -> Choice:
     The report: held_out_…, of single samples; held_out_lines_…, of lines of incidence, where there are three.
     log_error_cosine: the RMS error of the logarithm, with cosines; median_relative_error: over the samples.
     """
-    if len(samples.wi) > MOST_TRIED:
-        some = np.argsort(np.random.PCG64(1).random_raw(len(samples.wi)))[:MOST_TRIED]
-        samples = samples.some(np.sort(some))
+    samples = drawn(samples, MOST_TRIED)
     masks = {"held_out": points(samples), "held_out_lines": lines(samples)}
     tests = {name: mask for name, mask in masks.items() if mask.any() and (~mask).sum() >= 2 * NEIGHBOURS}
     found: list[tuple[float, Choice]] = []

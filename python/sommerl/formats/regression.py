@@ -31,6 +31,7 @@ NEIGHBOURS = 16  # 8 and 32 are worse at Cornell's samples, or at their lines of
 RIDGE = 1e-3  # keeps the planes flat where neighbours leave their slope open
 NEARNESS = 0.01  # a sample's weight at its own place is 1/NEARNESS times as much as without its growth
 SWAPPED = 0.1
+MOST_KNOWN = 300_000  # samples that planes are fitted to; of more, some drawn at random
 AT_ONCE = 2**14  # planes: bounds memory
 
 Floats = NDArray[np.float64]
@@ -45,7 +46,11 @@ def _smaller(theta_h: Floats, theta_d: Floats) -> Floats:
     return np.sqrt(np.minimum(theta_h, theta_d))
 
 
-RINGS: tuple[Ring, ...] = (_product, _smaller)
+def _wider(theta_h: Floats, theta_d: Floats) -> Floats:
+    return 2 * _smaller(theta_h, theta_d)
+
+
+RINGS: tuple[Ring, ...] = (_product, _smaller, _wider)
 
 
 class Regression(Brdf):
@@ -60,8 +65,9 @@ class Regression(Brdf):
     def __init__(self, samples: Samples, ring: Ring, *, one_sided: bool, mirrored: bool, name: str) -> None:
         self.name, self._samples = name, samples
         self._ring, self._one_sided, self._mirrored = ring, one_sided, mirrored
-        wi, wo = split(samples.wi), split(samples.wo)
-        self._known, self._domain = self._coordinates(wi, wo), np.cbrt(samples.f_r)
+        known = drawn(samples, MOST_KNOWN)
+        wi, wo = split(known.wi), split(known.wo)
+        self._known, self._domain = self._coordinates(wi, wo), np.cbrt(known.f_r)
         if one_sided:
             swapped = self._coordinates(wo, wi)
             swapped[:, -1] = SWAPPED
@@ -124,6 +130,14 @@ def planes(tree: Any, known: Floats, domain: Floats, wanted: Floats) -> Floats:
     moments: Floats = np.swapaxes(weighted, 1, 2) @ values
     height = np.linalg.solve(normal + flat, moments)[:, 0].astype(np.float64)
     return np.clip(height, values.min(axis=1), values.max(axis=1))  # a slope that goes on beyond them invents peaks
+
+
+def drawn(samples: Samples, most: int) -> Samples:
+    """The samples, or if there are more than `most`, that many of them, drawn at random."""
+    if len(samples.wi) <= most:
+        return samples
+    chosen = np.argsort(np.random.PCG64(1).random_raw(len(samples.wi)))[:most]
+    return samples.some(np.sort(chosen))
 
 
 def tree(points: Floats) -> Any:

@@ -15,7 +15,7 @@ from .lattice_choice import LatticeChoice
 from .quantise import Problem
 from .source import FittedSource, folds_of
 
-SAMPLED_LINES = 64  # that errors are measured on where the nodes are many
+SAMPLED_LINES = 32  # that errors are measured on where the nodes are many
 
 
 class Fitter:

@@ -39,11 +39,11 @@ SYMMETRIC = 1e-3  # a source that differs by less (`distance.sidedness`) is mirr
 LOWEST_COSINE = 1e-4  # closer to the horizon, no directions are drawn: f_r may have no bound there
 RIDGE = 0.05  # of the median of the matrix's diagonal; 0.5 costs 0.5 and 1.3 dB, 0.005 gains 0.5 and 0.7 dB
 # Of all samples together, in units of all random directions together
-SAMPLES_COUNT = 1.0
+SAMPLES_COUNT = 2.0
 BINS = 45, 90, 6  # of the density of samples, along the axes of the fine grid
 # What holds a node to the source, where it is fitted to samples alone: in units of what samples say of it, and of the
 # median of that
-HOLD, LEAST_HOLD = 0.1, 0.05
+HOLD, LEAST_HOLD = 0.05, 0.05
 # Of the conjugate gradients. They converge in fewer than 50 iterations; a tolerance of 10⁻³ costs the fit 2.4 dB.
 MOST_ITERATIONS, TOLERANCE = 200, 1e-5
 
