@@ -8,6 +8,7 @@ from pathlib import Path
 import factored_brdfs
 import h5py
 import numpy as np
+import page_files
 import pytest
 import rgl_files
 from helpers import complaint, lambertian_table, must_fail, random_directions, run
@@ -67,6 +68,7 @@ FILES = {
     "factored BRDF": lambda _: fbrdf_file.encode(factored_brdfs.even()),
     "MERL": lambda _: merl(),
     "RGL": lambda _: rgl_files.content(),
+    "MDL measured BSDF": lambda _: page_files.mbsdf(np.ones((3, 3, 4, 3))),
     "Cornell": lambda _: text("7\n400 450 500 550 600 650 700", 7, " "),
     "samples": lambda _: text(SAMPLES, 3, ","),
     "NumPy array": lambda _: saved(np.save, WEIGHT),

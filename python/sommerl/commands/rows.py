@@ -50,6 +50,8 @@ FACTS = {
     "cells_clamped": "cells whose negative channels were removed, or that were not finite",
     "energy_clamped": "share of the energy that this moved",
     "energy_averaged": "share of the energy that averaging both orders moved",
+    "grid": "angles of light and viewer, and azimuths between them",
+    "transmission_left_out": "transmission, which is left out",
     "samples_negative": "samples below 0 in a channel",
     "samples": "samples, at different directions",
     "samples_at_the_horizon": "samples at the horizon, left out",

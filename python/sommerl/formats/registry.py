@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ..system.errors import FormatError
-from . import cornell, fbrdf, fits, merl, nbrdf, numpy_materials, rgl, samples, scene, smrl, smrlib, source_code
+from . import cornell, fbrdf, fits, mbsdf, merl, nbrdf, numpy_materials, rgl, samples, scene, smrl, smrlib, source_code
 from .format import Format
 
 # In the order in which help and docs list them.
@@ -16,6 +16,7 @@ FORMATS: list[Format] = [
     fbrdf.FORMAT,
     merl.FORMAT,
     rgl.FORMAT,
+    mbsdf.FORMAT,
     cornell.FORMAT,
     samples.FORMAT,
     numpy_materials.ARRAY,

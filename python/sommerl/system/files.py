@@ -51,7 +51,7 @@ MARKS: tuple[tuple[bytes, bytes], ...] = (
 )
 WITHIN = 2**14  # bytes at the beginning and at the end of a file in which its mark is searched for
 # Files of these formats may be measurements, whoever wrote them.
-MEASURED = (".binary", ".bsdf", ".brdf", ".npy", ".npz", ".h5", ".hdf5")
+MEASURED = (".binary", ".bsdf", ".brdf", ".mbsdf", ".npy", ".npz", ".h5", ".hdf5")
 
 _replacing: ContextVar[bool] = ContextVar("replacing", default=True)
 
