@@ -27,7 +27,7 @@ def parsed(monkeypatch, tmp_path):
     def run(content, name="x.csv"):
         found = []
         with monkeypatch.context() as patch:
-            patch.setattr(samples, "to_table", lambda taken, **_: found.append(taken))
+            patch.setattr(samples, "from_samples", lambda taken, **_: found.append(taken))
             (tmp_path / name).write_bytes(content.encode() if isinstance(content, str) else content)
             load(tmp_path / name)
         return found[0]
@@ -230,5 +230,5 @@ def test_damaged_bytes_never_end_in_anything_but_a_sentence(tmp_path, data):
     path = tmp_path / "x.csv"
     path.write_bytes(bytes(whole))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(samples, "to_table", lambda taken, **_: taken)
+        patch.setattr(samples, "from_samples", lambda taken, **_: taken)
         check_sentence(complaint(load, path), "x.csv")

@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 
 from ..reflectance.distance import LOG_FLOOR
 from ..reflectance.samples import Samples
-from .regression import NEIGHBOURS, RINGS, Regression, Ring, drawn
+from .regression import CHARTS, NEIGHBOURS, Chart, Regression, drawn
 
 HELD_OUT = 10  # one sample in so many tests the others
-MOST_HELD_OUT = 2000
+MOST_HELD_OUT = 1000
 MOST_TRIED = 100_000  # samples that are tried on; of more, some drawn at random
 LINE = np.radians(0.25)  # samples whose θ_i differ by less are of one line of incidence
 LEAST_OF_LINE = 8  # samples; fewer are no line
+LEAST_GAP = 3  # times LINE, usually, from one line to the next
+ON_LINES = 0.9  # of all samples, at least; others were not measured along lines
 ONE_SIDED = 0.8  # of the error that is left otherwise: a lattice of both orders takes twice as many nodes
 EVERY_LINE = 3  # one line in so many of those between the first and the last
 
@@ -39,8 +41,9 @@ def lines(samples: Samples) -> Masks:
     theta_i = np.arctan2(np.hypot(samples.wi[:, 0], samples.wi[:, 1]), samples.wi[:, 2])
     line = np.rint(theta_i / LINE).astype(np.int64)
     known, count = np.unique(line, return_counts=True)
-    known = known[count >= LEAST_OF_LINE]
-    if count.sum() > len(known) * len(theta_i) or len(known) < 3:
+    many = count >= LEAST_OF_LINE
+    known, share = known[many], count[many].sum() / count.sum()
+    if len(known) < 3 or share < ON_LINES or np.median(np.diff(known)) < LEAST_GAP:
         return np.zeros(len(line), bool)
     return np.isin(line, known[1:-1:EVERY_LINE])
 
@@ -49,13 +52,13 @@ def lines(samples: Samples) -> Masks:
 class Choice:
     """How samples are interpolated: see `regression`. report: the errors at held-out samples."""
 
-    ring: Ring
+    chart: Chart
     one_sided: bool
     report: dict[str, float]
 
 
 def chosen(samples: Samples, both_sides: BothSides) -> Choice:
-    """Of RINGS, and of one-sided planes or reciprocal ones, the choice of the least error at held-out samples: of the
+    """Of CHARTS, and of one-sided planes or reciprocal ones, the choice of the least error at held-out samples: of the
     mean |log| with cosines, single ones and lines together. One-sided ones have to be better by ONE_SIDED.
 
     The report: held_out_…, of single samples; held_out_lines_…, of lines of incidence, where there are three.
@@ -66,16 +69,16 @@ def chosen(samples: Samples, both_sides: BothSides) -> Choice:
     tests = {name: mask for name, mask in masks.items() if mask.any() and (~mask).sum() >= 2 * NEIGHBOURS}
     found: list[tuple[float, Choice]] = []
     for one_sided in (False, True):
-        for ring in RINGS:
+        for chart in CHARTS:
             total, report = 0.0, dict[str, float]()
             for name, mask in tests.items():
                 known, mirrored = both_sides(samples.some(~mask))
                 tested = samples.some(np.flatnonzero(mask)[:: -(-int(mask.sum()) // MOST_HELD_OUT)])
-                material = Regression(known, ring, one_sided=one_sided, mirrored=mirrored, name="held out")
+                material = Regression(known, chart, one_sided=one_sided, mirrored=mirrored, name="held out")
                 mean, root, median = _errors(tested, material.eval(tested.wi, tested.wo))
                 total += mean if not one_sided else mean / ONE_SIDED
                 report |= {f"{name}_log_error_cosine": root, f"{name}_median_relative_error": median}
-            found.append((total, Choice(ring, one_sided, report)))
+            found.append((total, Choice(chart, one_sided, report)))
     return min(found, key=lambda each: each[0])[1]
 
 

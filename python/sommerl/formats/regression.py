@@ -3,11 +3,11 @@
 At each pair of directions, a plane is fitted to the nearest samples (Cleveland 1979), with weights that grow towards
 each sample until the plane all but passes through it (Lancaster & Salkauskas 1981), so that no peak that was measured
 is averaged away. Planes are of ∛f_r over coordinates in which a reciprocal, isotropic BRDF is one smooth function,
-(√θ_h, √θ_d, s cos 2φ_d, s sin 2φ_d): fine where highlights are, at θ_h = 0, and where retro-reflection is, at θ_d = 0.
-How far φ_d turns apart, s, is one of RINGS: that which says best what held-out samples are.
+(√θ_h, y, s cos 2φ_d, s sin 2φ_d). What y and s are, one of CHARTS says: √θ_d is fine where retro-reflection is, at
+θ_d = 0, as √θ_h is where highlights are; θ_d is better for smooth materials. Held-out samples decide (`held_out`).
 
 Samples whose directions were swapped need not agree, as where an instrument is a little out of line. One-sided planes
-keep both orders apart, in (√θ_h, √θ_d, 2 s cos φ_d, 2 s sin φ_d); where nothing was measured in one order, the other one
+keep both orders apart, in (√θ_h, y, 2 s cos φ_d, 2 s sin φ_d); where nothing was measured in one order, the other one
 stands for it, as if it were SWAPPED away.
 """
 
@@ -35,22 +35,27 @@ MOST_KNOWN = 300_000  # samples that planes are fitted to; of more, some drawn a
 AT_ONCE = 2**14  # planes: bounds memory
 
 Floats = NDArray[np.float64]
-Ring = Callable[[Floats, Floats], Floats]
+Chart = Callable[[Floats, Floats], tuple[Floats, Floats]]  #: y and s of θ_h and θ_d
 
 
-def _product(theta_h: Floats, theta_d: Floats) -> Floats:
-    return np.sin(theta_h) * np.sin(theta_d)
+def _smooth(theta_h: Floats, theta_d: Floats) -> tuple[Floats, Floats]:
+    return theta_d, np.sin(theta_h) * np.sin(theta_d)
 
 
-def _smaller(theta_h: Floats, theta_d: Floats) -> Floats:
-    return np.sqrt(np.minimum(theta_h, theta_d))
+def _retro(theta_h: Floats, theta_d: Floats) -> tuple[Floats, Floats]:
+    return np.sqrt(theta_d), np.sin(theta_h) * np.sin(theta_d)
 
 
-def _wider(theta_h: Floats, theta_d: Floats) -> Floats:
-    return 2 * _smaller(theta_h, theta_d)
+def _turning(theta_h: Floats, theta_d: Floats) -> tuple[Floats, Floats]:
+    return np.sqrt(theta_d), np.sqrt(np.minimum(theta_h, theta_d))
 
 
-RINGS: tuple[Ring, ...] = (_product, _smaller, _wider)
+def _wide(theta_h: Floats, theta_d: Floats) -> tuple[Floats, Floats]:
+    y, s = _turning(theta_h, theta_d)
+    return y, 2 * s
+
+
+CHARTS: tuple[Chart, ...] = (_smooth, _retro, _turning, _wide)
 
 
 class Regression(Brdf):
@@ -62,9 +67,9 @@ class Regression(Brdf):
 
     kind = "measurement"
 
-    def __init__(self, samples: Samples, ring: Ring, *, one_sided: bool, mirrored: bool, name: str) -> None:
+    def __init__(self, samples: Samples, chart: Chart, *, one_sided: bool, mirrored: bool, name: str) -> None:
         self.name, self._samples = name, samples
-        self._ring, self._one_sided, self._mirrored = ring, one_sided, mirrored
+        self._chart, self._one_sided, self._mirrored = chart, one_sided, mirrored
         known = drawn(samples, MOST_KNOWN)
         wi, wo = split(known.wi), split(known.wo)
         self._known, self._domain = self._coordinates(wi, wo), np.cbrt(known.f_r)
@@ -106,11 +111,10 @@ class Regression(Brdf):
 
     def _coordinates(self, wi: Triple, wo: Triple) -> Floats:
         theta_h, theta_d, phi_d = half_diff(wi, wo, self.reciprocal)
-        s = self._ring(theta_h, theta_d)
-        roots = np.sqrt(theta_h), np.sqrt(theta_d)
+        y, s = self._chart(theta_h, theta_d)
         if self._one_sided:
-            return np.stack([*roots, 2 * s * np.cos(phi_d), 2 * s * np.sin(phi_d), 0 * s], axis=-1)
-        return np.stack([*roots, s * np.cos(2 * phi_d), s * np.sin(2 * phi_d)], axis=-1)
+            return np.stack([np.sqrt(theta_h), y, 2 * s * np.cos(phi_d), 2 * s * np.sin(phi_d), 0 * s], axis=-1)
+        return np.stack([np.sqrt(theta_h), y, s * np.cos(2 * phi_d), s * np.sin(2 * phi_d)], axis=-1)
 
 
 def planes(tree: Any, known: Floats, domain: Floats, wanted: Floats) -> Floats:

@@ -16,13 +16,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..reflectance.brdf import Brdf
 from ..reflectance.samples import Samples
-from ..reflectance.table import BrdfTable
 from ..system import door
 from ..system.errors import FormatError
 from ..system.visible import visible
 from . import numpy_files
 from .format import Format
+from .meant import AS_WRITTEN, Meant
 from .scattered import from_samples
 from .text import LARGEST_FILE, rows, text_of, uncommented
 
@@ -44,12 +45,12 @@ def are_columns(names: Any) -> bool:
     return any(_column(name)[0] in ANGLES for name in names)
 
 
-def read(path: str | Path) -> BrdfTable:
-    """The table of a file of samples. Raises FormatError if it is not one, MissingDependencyError without SciPy."""
+def read(path: str | Path) -> Brdf:
+    """The material of a file of samples. Raises FormatError if it is not one, MissingDependencyError without SciPy."""
     return parse(Path(path), door.read(path, max(LARGEST_FILE, numpy_files.LARGEST_FILE)))
 
 
-def parse(path: Path, data: bytes) -> BrdfTable:
+def parse(path: Path, data: bytes, meant: Meant = AS_WRITTEN) -> Brdf:
     """As `read`, from the file's bytes; the path is for names and messages alone."""
     if data.startswith(numpy_files.MAGIC):
         columns = _fields(path, numpy_files.read_npy(path, data))
@@ -59,7 +60,9 @@ def parse(path: Path, data: bytes) -> BrdfTable:
         columns = _text(path, data)
     try:
         samples = _samples(columns)
-        return from_samples(samples, name=visible(path.stem), source_sha256=hashlib.sha256(data).hexdigest())
+        return from_samples(
+            samples, name=visible(path.stem), source_sha256=hashlib.sha256(data).hexdigest(), meant=meant
+        )
     except FormatError as error:
         raise FormatError(f"{path}: {error}") from error
 
@@ -178,5 +181,6 @@ FORMAT = Format(
     needs="formats",
     sniff=looks_like,
     read=parse,
+    meant=True,
     largest=LARGEST_FILE,
 )

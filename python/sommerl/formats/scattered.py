@@ -1,7 +1,8 @@
-"""From samples at any directions to a material.
+"""From samples to a material.
 
-`regression` says what lies between the samples. A lattice of nodes is chosen where that bends and where samples are
-dense, as the preset compact chooses its own, only finer, and its nodes are fitted to the samples by least squares.
+Samples on a regular grid become that grid (`gridded`). Of others, `regression` says what lies between the samples. A
+lattice of nodes is chosen where that bends and where samples are dense, as the preset compact chooses its own, only
+finer, and its nodes are fitted to the samples by least squares.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from ..compression.compact.lattice_fit import fitted_to_samples
 from ..reflectance.arrays import Triple, split
 from ..reflectance.brdf import LARGEST, Brdf, Native, Vectors, vectors
 from ..reflectance.cells import Lattice
+from ..reflectance.grid import GridBrdf
 from ..reflectance.half_diff import directions, half_diff
 from ..reflectance.info import Counts
 from ..reflectance.origin import Source
@@ -26,13 +28,19 @@ from ..reflectance.samples import Samples
 from ..system.errors import FormatError, MaterialError
 from ..system.interrupt import hold_interrupts
 from ..system.threads import limit
-from .held_out import chosen
+from .gridded import grid_of
+from .held_out import Choice, chosen
+from .meant import AS_WRITTEN, Meant
 from .regression import NEIGHBOURS, Regression, tree
 
 HORIZON = 1e-6  # cosines up to that are at the horizon
-REACH = np.radians(10.0)  # of a sample: pairs farther from all of them count as not measured
+REACH_DEGREES = 10.0
+REACH = np.radians(REACH_DEGREES)  # of a sample: pairs farther from all of them count as not measured
 COVERAGE = Lattice(36, 30, 60)  # where that is looked at
-NODES = 60_000  # of the lattice
+COARSEST = np.radians(
+    5.0
+)  # of a grid's usual steps in θ_i; between those of coarser ones, highlights would be seen twice
+NODES_A_SAMPLE, FEWEST_NODES, MOST_NODES = 10, 15_000, 60_000  # of the lattice
 SAME = 1e-4  # samples whose coordinates agree to that are one, measured several times
 IN_PLANE = np.radians(0.5)  # azimuths between 0 and this, or this and π, lie on neither side of the plane of incidence
 MOST_SAMPLES = 2_000_000
@@ -40,10 +48,11 @@ MOST_SAMPLES = 2_000_000
 
 class ScatteredBrdf(FittedTable):
     """A material that was fitted to samples. samples: these, at different directions. measured: whether one lies near
-    each cell of COVERAGE, of its shape."""
+    each cell of COVERAGE, of its shape. choice: how samples were interpolated."""
 
     kind = "measurement"
     measured: NDArray[np.bool_]
+    choice: Choice
 
     def __init__(self, fitted: FittedTable, samples: Samples, facts: Mapping[str, Any], source: Source) -> None:
         super().__init__(fitted.lattice, fitted.node_values, fitted.scale, signed=fitted.signed, name=fitted.name)
@@ -81,8 +90,28 @@ class ScatteredBrdf(FittedTable):
         return {name: value for name, value in self.__dict__.items() if name not in ("_native", "sampler")}
 
 
-def from_samples(samples: Samples, *, name: str, source_sha256: str = "") -> ScatteredBrdf:
-    """The material that is fitted to samples. Those at the horizon itself, where nothing can be measured, are left out.
+def from_samples(
+    samples: Samples, *, name: str, source_sha256: str = "", meant: Meant = AS_WRITTEN
+) -> GridBrdf | ScatteredBrdf:
+    """The material of samples: that of a regular grid (`gridded.grid_of`), or one that is fitted to them
+    (`fitted_to`). Those at the horizon itself, where nothing can be measured, are left out. meant: how their numbers
+    are.
+
+    Raises FormatError for samples below the horizon or fewer than 2·NEIGHBOURS, and MissingDependencyError without
+    SciPy if they are on no grid.
+    """
+    _check(samples)
+    samples = meant.f_r(samples)
+    above = np.minimum(samples.wi[:, 2], samples.wo[:, 2]) > HORIZON
+    grid = grid_of(samples.some(above), name=name, source_sha256=source_sha256)
+    if grid and np.median(np.diff(grid.axes[0])) <= COARSEST:
+        return grid
+    return fitted_to(samples, name=name, source_sha256=source_sha256)
+
+
+def fitted_to(samples: Samples, *, name: str, source_sha256: str = "", choice: Choice | None = None) -> ScatteredBrdf:
+    """The material that is fitted to samples, whether they are on a grid or not. choice: how they are interpolated, if
+    that is known already.
 
     It is reciprocal, and keeps negative values where samples have some.
 
@@ -91,8 +120,7 @@ def from_samples(samples: Samples, *, name: str, source_sha256: str = "") -> Sca
     of incidence, and stand for the other, too; coverage, the share of all pairs of directions, by solid angles and
     cosines, that is within REACH of a sample; and what `held_out.chosen` reports.
 
-    Raises FormatError for samples below the horizon or fewer than 2·NEIGHBOURS, and MissingDependencyError without
-    SciPy.
+    Raises FormatError and MissingDependencyError as `from_samples`.
     """
     _check(samples)
     above = np.minimum(samples.wi[:, 2], samples.wo[:, 2]) > HORIZON
@@ -103,10 +131,10 @@ def from_samples(samples: Samples, *, name: str, source_sha256: str = "") -> Sca
     if not (kept.f_r > 0).any():
         raise FormatError("expected a positive reflectance in some sample, found none")
     both, mirrored = both_sides(kept)
-    choice = chosen(kept, both_sides)
-    found = Regression(both, choice.ring, one_sided=choice.one_sided, mirrored=mirrored, name=name)
+    choice = choice or chosen(kept, both_sides)
+    found = Regression(both, choice.chart, one_sided=choice.one_sided, mirrored=mirrored, name=name)
     try:
-        fitted = fitted_to_samples(found, NODES)
+        fitted = fitted_to_samples(found, int(np.clip(NODES_A_SAMPLE * len(kept.wi), FEWEST_NODES, MOST_NODES)))
     except MaterialError as error:
         raise FormatError(str(error)) from error
     measured = near(both, *directions(*(angle[COVERAGE.above_horizon] for angle in COVERAGE.angles())))
@@ -122,6 +150,7 @@ def from_samples(samples: Samples, *, name: str, source_sha256: str = "") -> Sca
         **choice.report,
     }
     brdf = ScatteredBrdf(fitted, kept, facts, Source(source_sha256))
+    brdf.choice = choice
     brdf.measured = np.zeros(COVERAGE.shape, bool)
     brdf.measured[COVERAGE.above_horizon] = measured
     return brdf
@@ -157,8 +186,9 @@ def merged(samples: Samples) -> Samples:
     )
     if len(first) == len(group):
         return samples
-    sums = np.stack([np.bincount(group, weights=channel) for channel in samples.f_r.T], axis=-1)
-    return Samples(samples.wi[first], samples.wo[first], sums / count[:, None])
+    means = np.stack([np.bincount(group, weights=channel) for channel in samples.f_r.T], axis=-1) / count[:, None]
+    order = np.argsort(first)  # that of the file
+    return Samples(samples.wi[first[order]], samples.wo[first[order]], means[order])
 
 
 def both_sides(samples: Samples) -> tuple[Samples, bool]:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ... import _core
 from ...reflectance.arrays import Triple, split
 from ...reflectance.brdf import Brdf
-from ...reflectance.distance import sidedness
+from ...reflectance.distance import asymmetry, sidedness
 from ...reflectance.half_diff import directions
 from ...reflectance.nodes import ABOVE, BELOW, FINE, KNEE, SMALLEST_COSINE, NodeLattice, angles_at, damped, place
 from ...reflectance.samples import Samples
@@ -35,7 +35,9 @@ Array = NDArray[np.float64]
 DIRECTIONS_A_NODE = 36
 # Powers of the solid angle and of the cosines in the weights (docs/method.md)
 SOLID_POWER, COSINE_POWER = 0.75, 0.25
-SYMMETRIC = 1e-3  # a source that differs by less (`distance.sidedness`) is mirrored; RGL's files differ by 10⁻⁵ at most
+# A source that differs by less (`distance.sidedness`, `distance.asymmetry`) is taken for mirrored, or for reciprocal;
+# between sides RGL's files differ by 10⁻⁵ at most, between orders by 4 % at least
+SYMMETRIC = 1e-3
 LOWEST_COSINE = 1e-4  # closer to the horizon, no directions are drawn: f_r may have no bound there
 RIDGE = 0.05  # of the median of the matrix's diagonal; 0.5 costs 0.5 and 1.3 dB, 0.005 gains 0.5 and 0.7 dB
 # Of all samples together, in units of all random directions together
@@ -154,9 +156,7 @@ class FittedSource:
         return np.clip(found, self._targets.min(axis=0), self._targets.max(axis=0))
 
     def _equations(self, lattice: NodeLattice) -> _core.NormalEquations:
-        return _core.NormalEquations.of(
-            *lattice.axes(), self._places, self._weights, self._targets, **lattice.folds
-        )
+        return _core.NormalEquations.of(*lattice.axes(), self._places, self._weights, self._targets, **lattice.folds)
 
     def _sort(self) -> None:
         """Puts places in the order of θ_h."""
@@ -194,10 +194,10 @@ class _Measured:
         self.places = np.stack(place(wi, wo, **folds), axis=-1)
         self.values: Array = samples.f_r * damped(wi, wo, smooth=True)[:, None]
         counts = np.histogramdd(self.places, BINS, [(0, FINE)] * 3)[0]
-        axes = np.meshgrid(*((np.arange(count) + 0.5) * (FINE / count) for count in BINS), indexing="ij")
-        wi, wo = directions(*angles_at(*axes, **folds))
+        x, y, z = np.meshgrid(*((np.arange(count) + 0.5) * (FINE / count) for count in BINS), indexing="ij")
+        wi, wo = directions(*angles_at(x, y, z, **folds))
         above = np.minimum(wi[2], wo[2]) > SMALLEST_COSINE
-        mean = float(_weight(*axes, wi, wo)[above].mean())
+        mean = float(np.mean(_weight(x, y, z, wi, wo)[above]))
         self._density: Array = counts * (mean * above.sum() / counts.sum())
 
     def weight(self, x: Array, y: Array, z: Array) -> Array:
@@ -221,7 +221,11 @@ def _weight(x: Array, y: Array, z: Array, wi: Triple, wo: Triple) -> Array:
 
 def folds_of(brdf: Brdf) -> dict[str, bool]:
     """How a lattice may fold φ_d for a source, as `NodeLattice` takes it: whether both orders of the directions give
-    the same; and whether light from both sides of the viewer's plane does, by construction or as far as can be seen."""
+    the same, and whether light from both sides of the viewer's plane does, by construction or as far as can be seen."""
     buffers = brdf.buffers()
-    mirrored = brdf.mirrored or sidedness(lambda wi, wo: brdf.f_r(wi, wo, buffers)) < SYMMETRIC
-    return {"reciprocal": brdf.reciprocal, "mirrored": mirrored}
+
+    def f_r(wi: Triple, wo: Triple) -> Triple:
+        return brdf.f_r(wi, wo, buffers)
+
+    reciprocal = brdf.reciprocal or asymmetry(f_r) < SYMMETRIC
+    return {"reciprocal": reciprocal, "mirrored": brdf.mirrored or sidedness(f_r) < SYMMETRIC}
