@@ -69,8 +69,8 @@ def angles_of(samples: Samples) -> tuple[Floats, Floats, Floats]:
     theta_i, theta_o = (np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2]) for w in (samples.wi, samples.wo))
     (x, y), (u, v) = samples.wi[:, :2].T, samples.wo[:, :2].T
     phi = np.arctan2(x * v - y * u, x * u + y * v)
-    around = np.where(phi < -STEP / 2, phi + TWO_PI, np.maximum(phi, 0.0))
-    return theta_i, theta_o, np.asarray(around, np.float64)
+    phi[phi < -STEP / 2] += TWO_PI
+    return theta_i, theta_o, np.maximum(phi, 0.0)
 
 
 def _axis(angle: Floats) -> tuple[Floats, NDArray[np.int64]]:

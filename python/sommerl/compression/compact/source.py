@@ -194,7 +194,8 @@ class _Measured:
         self.places = np.stack(place(wi, wo, **folds), axis=-1)
         self.values: Array = samples.f_r * damped(wi, wo, smooth=True)[:, None]
         counts = np.histogramdd(self.places, BINS, [(0, FINE)] * 3)[0]
-        x, y, z = np.meshgrid(*((np.arange(count) + 0.5) * (FINE / count) for count in BINS), indexing="ij")
+        axes = [np.asarray((np.arange(count) + 0.5) * (FINE / count), np.float64) for count in BINS]
+        x, y, z = np.meshgrid(*axes, indexing="ij")
         wi, wo = directions(*angles_at(x, y, z, **folds))
         above = np.minimum(wi[2], wo[2]) > SMALLEST_COSINE
         mean = float(np.mean(_weight(x, y, z, wi, wo)[above]))
