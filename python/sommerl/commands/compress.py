@@ -22,11 +22,11 @@ from ..render.compress import compress as compressed
 from ..render.judge import Judge
 from ..system.errors import OptionError, SommerlError
 from . import answers, console
-from .arguments import Material, option, positional
+from .arguments import Material, ReadingArguments, option, positional
 from .checks import check_output
 from .folders import make_folder
 from .inputs import expanded, is_several, readable, stem
-from .laboratory import SampleArguments, check_samples, reported, warn_of_samples
+from .laboratory import ReportArguments, check_samples, reported, warn_of_samples
 from .method_arguments import MethodArguments, chosen_method
 from .outcome import PartlyDone
 from .parser import add_command
@@ -34,7 +34,7 @@ from .rows import changed_rows, fact_rows, judged_rows, origin_rows, table_rows
 
 
 @dataclass(frozen=True, kw_only=True)
-class CompressArguments(MethodArguments, SampleArguments):
+class CompressArguments(ReportArguments, ReadingArguments, MethodArguments):
     """What `compress` is asked for."""
 
     inputs: tuple[Material, ...] = positional(
@@ -86,7 +86,7 @@ def compress(options: CompressArguments) -> dict[str, Any]:
 def _compressed(
     source: str, output: Path, method: CompactOptions | TrainOptions, options: CompressArguments
 ) -> dict[str, Any]:
-    brdf = load(source, options.meant)
+    brdf = load(source)
     check_samples(options, brdf, source)
     warn_of_samples(brdf, source)
 

@@ -22,17 +22,17 @@ from ..reflectance.reciprocal import reciprocal
 from ..reflectance.table import BrdfTable
 from ..system.errors import OptionError
 from . import answers, console
-from .arguments import Material, WritingArguments, byte_count, named_as_typed, option, positional
+from .arguments import Material, ReadingArguments, WritingArguments, byte_count, named_as_typed, option, positional
 from .checks import check_apart, check_output
 from .compress import compact_one, compress_one, fitted, trained
 from .inputs import expanded, is_several, read_all
-from .laboratory import SampleArguments, check_samples, reported, warn_of_samples
+from .laboratory import ReportArguments, check_samples, reported, warn_of_samples
 from .parser import add_command
 from .rows import changed_rows, fact_rows
 
 
 @dataclass(frozen=True, kw_only=True)
-class ConvertArguments(WritingArguments, SampleArguments):
+class ConvertArguments(ReportArguments, ReadingArguments, WritingArguments):
     """What `convert` is asked for."""
 
     inputs: tuple[Material, ...] = positional(
@@ -75,11 +75,7 @@ def convert(options: ConvertArguments) -> dict[str, Any]:
     kind = checked(options)
     if len(options.inputs) > 1 or is_several(options.input):
         return _convert_several(options, kind)
-    brdf = (
-        load(options.input, options.meant)
-        if options.noise is None
-        else builtin_table(options.input, noise=options.noise)
-    )
+    brdf = load(options.input) if options.noise is None else builtin_table(options.input, noise=options.noise)
     return converted(brdf, kind, options)
 
 

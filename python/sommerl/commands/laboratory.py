@@ -11,8 +11,8 @@ from typing import Any
 from ..formats import residuals
 from ..formats.compared import compared, samples_of
 from ..formats.load import load
-from ..formats.meant import AS_WRITTEN, Meant, PhiFrom, Values
 from ..formats.plausible import checked
+from ..formats.reading import asked
 from ..formats.scattered import REACH_DEGREES, extrapolated
 from ..reflectance.brdf import Brdf
 from ..system.errors import OptionError
@@ -25,28 +25,15 @@ PARTS = {"held_out": "every tenth sample", "held_out_lines": "lines of incidence
 
 
 @dataclass(frozen=True, kw_only=True)
-class SampleArguments(Arguments):
+class ReportArguments(Arguments):
     """What commands that make something of samples can be asked for."""
 
-    values: Values = option(
-        default=AS_WRITTEN.values,
-        help="samples: what values are: f_r [1/sr], f_r times cos θ_o, or reflectance factors, π f_r, also in percent "
-        "(%(default)s)",
-    )
-    phi_from: PhiFrom = option(
-        default=AS_WRITTEN.phi_from,
-        help="samples: where the viewer's azimuth is 0 from: the light's side, or the mirror's direction (%(default)s)",
-    )
     residuals: Path | None = option(
         default=None, metavar="FILE.csv", help="samples: write measured values, those of OUT, and their differences"
     )
 
-    @property
-    def meant(self) -> Meant:
-        return Meant(self.values, self.phi_from)
 
-
-def check_samples(options: SampleArguments, brdf: Brdf, source: str) -> None:
+def check_samples(options: ReportArguments, brdf: Brdf, source: str) -> None:
     """Raises OptionError or OSError for residuals of what has no samples, or that cannot be written."""
     if options.residuals is not None:
         if samples_of(brdf) is None:
@@ -65,7 +52,7 @@ def warn_of_samples(brdf: Brdf, source: str) -> None:
 
 
 def reported(
-    source: str, brdf: Brdf, output: Path, made: Callable[[Brdf], Brdf], options: SampleArguments
+    source: str, brdf: Brdf, output: Path, made: Callable[[Brdf], Brdf], options: ReportArguments
 ) -> dict[str, Any]:
     """What is to be said of a file that was made of samples, for --json; and, unless that is asked for, says it.
 
@@ -78,7 +65,7 @@ def reported(
     written = load(output)
     with console.progress(f"leaving samples out of {brdf.name}"):
         report = compared(brdf, written, made)
-    physics = checked(samples, brdf, options.meant)
+    physics = checked(samples, brdf, asked())
     for sentence in physics["mistakes"]:
         console.warn(f"{source}: {sentence}")
     if options.residuals is not None:

@@ -18,7 +18,6 @@ from ..system import door
 from ..system.errors import FormatError
 from ..system.visible import visible
 from .format import Format
-from .meant import AS_WRITTEN, Meant
 from .scattered import from_samples
 from .spectra import srgb_weights
 from .text import LARGEST_FILE, rows, text_of, uncommented
@@ -37,10 +36,12 @@ def read(path: str | Path) -> Brdf:
     return parse(Path(path), door.read(path, LARGEST_FILE))
 
 
-def parse(path: Path, data: bytes, meant: Meant = AS_WRITTEN) -> Brdf:
+def parse(path: Path, data: bytes) -> Brdf:
     """As `read`, from the file's bytes; the path is for names and messages alone."""
     lines = uncommented(text_of(path, data))
     if not lines or not re.fullmatch(r"\d{1,9}", lines[0]) or not 2 <= int(lines[0]) <= MOST_WAVELENGTHS:
+        if lines and lines[0].split()[0] == "analytic":
+            raise FormatError(f"{path}: expected samples, found a formula for BRDF Explorer, which is a program")
         found = repr(lines[0][:20]) if lines else "nothing"
         raise FormatError(f"{path}: number of wavelengths: expected 2 to {MOST_WAVELENGTHS}, found {found}")
     count, start = int(lines[0]), 1
@@ -60,7 +61,6 @@ def parse(path: Path, data: bytes, meant: Meant = AS_WRITTEN) -> Brdf:
             Samples.at_angles(samples[:, :4], samples[:, 4:] @ srgb_weights(nanometres)),
             name=visible(path.stem),
             source_sha256=hashlib.sha256(data).hexdigest(),
-            meant=meant,
         )
     except FormatError as error:
         raise FormatError(f"{path}: {error}") from error
@@ -73,6 +73,5 @@ FORMAT = Format(
     needs="formats",
     sniff=looks_like,
     read=parse,
-    meant=True,
     largest=LARGEST_FILE,
 )

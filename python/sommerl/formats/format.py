@@ -30,7 +30,6 @@ class Format:
         is always the same, from the path of one. What it gives of other files is that path alone.
     write: writes a material to a path, and returns what the file holds: that material, or a table made from it.
     write_several: writes any number of compact materials into one file; None if a file holds one material.
-    meant: whether `read` also takes how a file's numbers are meant (`meant.Meant`), as `meant`.
     compressed: whether it is written from compressed materials alone.
     names_source: whether a file that is written names the material's own file and holds nothing of it. `write` then
         takes that name in place of the material.
@@ -44,7 +43,6 @@ class Format:
     read: Callable[..., Brdf] | None = None
     largest: int = 0
     opened: bool = False
-    meant: bool = False
     members: Callable[[Path, Any], Sequence[str]] | None = None
     parts: Callable[[Path], Sequence[Path]] | None = None
     write: Callable[[Any, Path], Any] | None = None

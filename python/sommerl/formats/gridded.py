@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,7 +22,9 @@ MOST_MISSING = 0.05  # of a grid's points: these are interpolated along Δφ
 Floats = NDArray[np.float64]
 
 
-def grid_of(samples: Samples, *, name: str, source_sha256: str = "") -> GridBrdf | None:
+def grid_of(
+    samples: Samples, *, name: str, source_sha256: str = "", facts: Mapping[str, Any] = MappingProxyType({})
+) -> GridBrdf | None:
     """The material of samples that lie on a regular grid; None of others.
 
     samples: finite, none below the horizon. Where more than one are at a point of the grid, it has their mean.
@@ -53,13 +59,14 @@ def grid_of(samples: Samples, *, name: str, source_sha256: str = "") -> GridBrdf
     if missing.mean() > MOST_MISSING or missing.all(axis=2).any():
         return None
     _fill(values, missing, azimuths)
-    facts = {
+    found_facts = {
         "samples": len(theta_i),
         "samples_merged": len(theta_i) - int((np.bincount(flat) > 0).sum()),
         "grid_points_missing": int(missing.sum()),
+        **facts,
     }
     try:
-        return GridBrdf(light, viewer, azimuths, values, name=name, source_sha256=source_sha256, facts=facts)
+        return GridBrdf(light, viewer, azimuths, values, name=name, source_sha256=source_sha256, facts=found_facts)
     except MaterialError as error:
         raise FormatError(str(error)) from error
 

@@ -9,19 +9,17 @@ from ..models.builtin import NAMES, builtin
 from ..reflectance.brdf import Brdf
 from ..reflectance.table import BrdfTable
 from ..system import door
-from ..system.errors import FormatError, OptionError
-from .meant import AS_WRITTEN, Meant
+from ..system.errors import FormatError
 from .names import split_member
 from .registry import recognised
 
 
-def load(source: str | Path, meant: Meant = AS_WRITTEN) -> Brdf:
+def load(source: str | Path) -> Brdf:
     """The material in a file of any known format, recognised by its content, or the built-in one of that name.
 
     Of a library of materials, "FILE.smrlib:NAME" is one; of an archive of neural BRDFs, "FILE.npz:NAME"; of a file of
-    fits, "FILE.json:MODEL". meant: how the numbers in a file of samples are. Raises FormatError for a file in no known
-    format, MaterialError for a name that is neither file nor built-in, OptionError if a material that is not made of
-    samples is to be read in another way.
+    fits, "FILE.json:MODEL". Raises FormatError for a file in no known format, MaterialError for a name that is neither
+    file nor built-in.
     """
     path, member = split_member(source)
     if not os.path.isfile(path) and str(source) in NAMES:
@@ -36,10 +34,6 @@ def load(source: str | Path, meant: Meant = AS_WRITTEN) -> Brdf:
             raise FormatError(f"{path}: expected an archive of materials, to take {member} from it, found one material")
         assert kind.read
         content = kind.content(file)
-        if kind.meant:
-            return kind.read(path, content, meant=meant)
-        if meant != AS_WRITTEN:
-            raise OptionError(f"--values, --phi-from: expected a file of samples, found another one ({path})")
         return kind.read(path, content, member) if kind.members else kind.read(path, content)
 
 

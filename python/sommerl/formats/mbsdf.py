@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 
 from ..reflectance.brdf import Brdf
 from ..reflectance.grid import GridBrdf
-from ..reflectance.half_diff import TWO_PI, spherical
+from ..reflectance.half_diff import TWO_PI
 from ..system import door
 from ..system.errors import FormatError, MaterialError
 from ..system.files import atomic_write
 from ..system.visible import visible
 from .format import Format
+from .grids import on_grid
 
 MAGIC = b"NVIDIA ARC MBSDF"
 FIRST_LINE = MAGIC + b" V1\n"
@@ -34,7 +35,6 @@ MOST_VALUES = 2**26
 LARGEST_FILE = 2**29  # bytes
 LONGEST_TEXT = 2**16  # bytes before the data
 WRITTEN = (45, 90)  # bins in θ and in φ, as in the examples of MDL's SDK
-AT_ONCE = 2**18  # directions evaluated at once
 
 
 def looks_like(head: bytes) -> bool:
@@ -117,33 +117,10 @@ def write(brdf: Brdf, path: str | Path) -> None:
         own = zip(brdf.axes, _axes(n, m), strict=True)
         if all(len(a) == len(b) and np.allclose(a, b, rtol=0, atol=1e-12) for a, b in own):
             thetas, phis = n, m
-    values = on_grid(brdf, *_axes(thetas, phis), both_sides=not brdf.mirrored)
+    values = on_grid(brdf, _axes(thetas, phis), both_sides=not brdf.mirrored)
     with atomic_write(Path(path)) as out:
         out.write(FIRST_LINE + b"MBSDF_DATA_REFLECTION=\n" + HEAD.pack(1, thetas, phis))
         out.write(values.astype("<f4").tobytes())
-
-
-def on_grid(
-    brdf: Brdf,
-    theta_i: NDArray[np.float64],
-    theta_o: NDArray[np.float64],
-    phi: NDArray[np.float64],
-    *,
-    both_sides: bool = False,
-) -> NDArray[np.float64]:
-    """f_r at all combinations of angles [rad], (n, m, k, 3). both_sides: the mean of those at φ and −φ."""
-    angles = np.meshgrid(theta_i, theta_o, phi, indexing="ij")
-    t, v, p = (angle.reshape(-1) for angle in angles)
-    found = np.empty((len(t), 3))
-    for start in range(0, len(t), AT_ONCE):
-        part = slice(start, start + AT_ONCE)
-        light = np.stack(spherical(t[part], np.zeros_like(p[part])), axis=-1)
-        values = [
-            brdf.eval(light, np.stack(spherical(v[part], side * p[part]), axis=-1))
-            for side in ((1.0, -1.0) if both_sides else (1.0,))
-        ]
-        found[part] = np.mean(values, axis=0)
-    return found.reshape(*angles[0].shape, 3)
 
 
 def _write(brdf: Brdf, path: Path) -> Brdf:

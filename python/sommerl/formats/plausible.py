@@ -14,7 +14,7 @@ from ..reflectance.brdf import Brdf
 from ..reflectance.half_diff import spherical
 from ..reflectance.samples import Samples
 from .gridded import angles_of
-from .meant import AS_WRITTEN, Meant
+from .reading import AS_IT_IS, Reading
 from .regression import drawn, tree
 
 Floats = NDArray[np.float64]
@@ -32,7 +32,7 @@ STEPS = 90, 180  # in θ_o and φ, of its quadrature
 MANY = 0.5  # of the lines of incidence, so that something is said of all
 
 
-def checked(samples: Samples, brdf: Brdf, meant: Meant = AS_WRITTEN) -> dict[str, Any]:
+def checked(samples: Samples, brdf: Brdf, meant: Reading = AS_IT_IS) -> dict[str, Any]:
     """What physics says of samples and of the material made from them.
 
     swapped_pairs: how many samples have a partner with swapped directions, within 1°; swapped_asymmetry: Σ |a − b| over
@@ -54,7 +54,7 @@ def checked(samples: Samples, brdf: Brdf, meant: Meant = AS_WRITTEN) -> dict[str
     return found | {"mistakes": _mistakes(found, meant)}
 
 
-def _mistakes(found: dict[str, Any], meant: Meant) -> list[str]:
+def _mistakes(found: dict[str, Any], meant: Reading) -> list[str]:
     sentences: list[str] = []
     plain, without = found["swapped_asymmetry"], found["swapped_asymmetry_without_cosine"]
     if plain is not None and plain > NOTABLE and without < BETTER * plain and meant.values == "f_r":

@@ -6,7 +6,25 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ..system.errors import FormatError
-from . import cornell, fbrdf, fits, mbsdf, merl, nbrdf, numpy_materials, rgl, samples, scene, smrl, smrlib, source_code
+from . import (
+    alta,
+    astm,
+    cornell,
+    fbrdf,
+    fits,
+    mbsdf,
+    merl,
+    nbrdf,
+    numpy_materials,
+    rgl,
+    samples,
+    scene,
+    smrl,
+    smrlib,
+    source_code,
+    xompt,
+    zemax,
+)
 from .format import Format
 
 # In the order in which help and docs list them.
@@ -17,7 +35,11 @@ FORMATS: list[Format] = [
     merl.FORMAT,
     rgl.FORMAT,
     mbsdf.FORMAT,
+    xompt.FORMAT,
+    zemax.FORMAT,
     cornell.FORMAT,
+    alta.FORMAT,
+    astm.FORMAT,
     samples.FORMAT,
     numpy_materials.ARRAY,
     numpy_materials.ARCHIVE,
@@ -64,7 +86,7 @@ def recognised(path: Path, head: bytes) -> Format:
 def listed(formats: Iterable[Format]) -> str:
     """Formats for people, one a line: the extensions, the name, and what is in a file."""
     return "\n".join(
-        f"  {' '.join(each.extensions):22}{each.name}: {each.summary}"
+        f"  {' '.join(each.extensions):21} {each.name}: {each.summary}"
         + (f" (needs sommerl[{each.needs}])" if each.needs else "")
         for each in formats
     )

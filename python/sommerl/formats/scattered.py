@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,8 @@ from ..system.interrupt import hold_interrupts
 from ..system.threads import limit
 from .gridded import grid_of
 from .held_out import Choice, chosen
-from .meant import AS_WRITTEN, Meant
+from .meant import as_f_r
+from .reading import asked
 from .regression import NEIGHBOURS, Regression, tree
 
 HORIZON = 1e-6  # cosines up to that are at the horizon
@@ -91,34 +93,43 @@ class ScatteredBrdf(FittedTable):
 
 
 def from_samples(
-    samples: Samples, *, name: str, source_sha256: str = "", meant: Meant = AS_WRITTEN
+    samples: Samples, *, name: str, source_sha256: str = "", facts: Mapping[str, Any] = MappingProxyType({})
 ) -> GridBrdf | ScatteredBrdf:
-    """The material of samples: that of a regular grid (`gridded.grid_of`), or one that is fitted to them
-    (`fitted_to`). Those at the horizon itself, where nothing can be measured, are left out. meant: how their numbers
-    are.
+    """The material of samples, whose numbers are meant as `reading.asked` says: that of a regular grid
+    (`gridded.grid_of`), or one that is fitted to them (`fitted_to`). Those at the horizon itself, where nothing can be
+    measured, are left out. facts: what the file's reader reports.
 
     Raises FormatError for samples below the horizon or fewer than 2·NEIGHBOURS, and MissingDependencyError without
     SciPy if they are on no grid.
     """
     _check(samples)
-    samples = meant.f_r(samples)
+    samples = as_f_r(samples, asked())
     above = np.minimum(samples.wi[:, 2], samples.wo[:, 2]) > HORIZON
-    grid = grid_of(samples.some(above), name=name, source_sha256=source_sha256)
+    kept = samples if above.all() else samples.some(above)
+    grid = grid_of(kept, name=name, source_sha256=source_sha256, facts=facts)
     if grid and np.median(np.diff(grid.axes[0])) <= COARSEST:
         return grid
-    return fitted_to(samples, name=name, source_sha256=source_sha256)
+    return fitted_to(samples, name=name, source_sha256=source_sha256, facts=facts)
 
 
-def fitted_to(samples: Samples, *, name: str, source_sha256: str = "", choice: Choice | None = None) -> ScatteredBrdf:
-    """The material that is fitted to samples, whether they are on a grid or not. choice: how they are interpolated, if
-    that is known already.
+def fitted_to(
+    samples: Samples,
+    *,
+    name: str,
+    source_sha256: str = "",
+    facts: Mapping[str, Any] = MappingProxyType({}),
+    choice: Choice | None = None,
+) -> ScatteredBrdf:
+    """The material that is fitted to samples, whether they are on a grid or not. facts: what the file's reader reports.
+    choice: how samples are interpolated, if that is known already.
 
-    It is reciprocal, and keeps negative values where samples have some.
+    It keeps negative values where samples have some.
 
     Its facts: samples, those at different directions; samples_merged, how many repeated others; samples_at_the_horizon,
     those left out; samples_negative, those with a channel below 0; mirrored, whether they lay on one side of the plane
     of incidence, and stand for the other, too; coverage, the share of all pairs of directions, by solid angles and
-    cosines, that is within REACH of a sample; and what `held_out.chosen` reports.
+    cosines, that is within REACH of a sample; one_sided, whether both orders of the directions are kept apart; and what
+    `held_out.chosen` reports.
 
     Raises FormatError and MissingDependencyError as `from_samples`.
     """
@@ -139,7 +150,7 @@ def fitted_to(samples: Samples, *, name: str, source_sha256: str = "", choice: C
         raise FormatError(str(error)) from error
     measured = near(both, *directions(*(angle[COVERAGE.above_horizon] for angle in COVERAGE.angles())))
     weight = (COVERAGE.solid_angles() * np.prod(COVERAGE.cosines(), axis=0))[COVERAGE.above_horizon]
-    facts = {
+    found_facts: dict[str, Any] = {
         "samples": len(kept.wi),
         "samples_merged": int(above.sum()) - len(kept.wi),
         "samples_at_the_horizon": int((~above).sum()),
@@ -148,8 +159,9 @@ def fitted_to(samples: Samples, *, name: str, source_sha256: str = "", choice: C
         "coverage": float((weight * measured).sum() / weight.sum()),
         "one_sided": choice.one_sided,
         **choice.report,
+        **facts,
     }
-    brdf = ScatteredBrdf(fitted, kept, facts, Source(source_sha256))
+    brdf = ScatteredBrdf(fitted, kept, found_facts, Source(source_sha256))
     brdf.choice = choice
     brdf.measured = np.zeros(COVERAGE.shape, bool)
     brdf.measured[COVERAGE.above_horizon] = measured

@@ -15,6 +15,7 @@ from .arrays import Array, Triple, gather3, ops
 from .brdf import LARGEST, Brdf, Buffers
 from .distance import asymmetry, negative_share
 from .half_diff import TWO_PI
+from .info import Counts
 from .lattice import blended
 from .origin import Source
 
@@ -32,7 +33,7 @@ class GridBrdf(Brdf):
         all [rad], increasing. values: f_r [1/sr], linear RGB, (n, m, k, 3); a channel may be negative.
     about_mirror: theta_o and phi are polar coordinates about the mirror direction of the light instead of the normal,
         φ from the side where the normal is, as Zemax' files have them.
-    facts: what the reader of a file reports.
+    facts: what the reader of a file reports. clamped: how many of the values were changed before, for `counts`.
 
     A φ that ends at π or before stands for both sides of the plane of incidence; one that goes further is a full turn,
     and periodic. Between the angles f_r is linear in each of the three; beyond the first and the last it is constant.
@@ -55,6 +56,7 @@ class GridBrdf(Brdf):
         name: str = "grid",
         source_sha256: str = "",
         facts: Mapping[str, Any] = MappingProxyType({}),
+        clamped: int = 0,
     ) -> None:
         self.name = name
         self.source = Source(source_sha256)
@@ -62,6 +64,7 @@ class GridBrdf(Brdf):
         self.values = np.asarray(values, np.float64)
         self.about_mirror = about_mirror
         self._reported = dict(facts)
+        self._clamped = clamped
         _check(self.axes, self.values, HALF_TURN if about_mirror else QUARTER)
         axes, extended = self._extended()
         self._points = [len(axis) for axis in axes]
@@ -92,6 +95,10 @@ class GridBrdf(Brdf):
         points = " × ".join(str(len(axis)) for axis in self.axes)
         measured = {"grid": points, "asymmetry": asymmetry(self._here), "energy_negative": negative_share(self._here)}
         return measured | self._reported
+
+    @property
+    def counts(self) -> Counts:
+        return Counts(cells_clamped=self._clamped)
 
     def _here(self, wi: Triple, wo: Triple) -> Triple:
         return self.f_r(wi, wo, self._buffers)
@@ -173,7 +180,8 @@ def _steps(axis: Values) -> NDArray[np.uint32]:
     angle at or before each step's beginning."""
     if len(axis) == 1:
         return np.zeros(1, np.uint32)
-    count = min(int(np.ceil((axis[-1] - axis[0]) / np.diff(axis).min())) + 1, MOST_STEPS)
+    smallest = float(np.diff(axis).min())
+    count = min(int((axis[-1] - axis[0]) / smallest) + 2, MOST_STEPS)
     begins = axis[0] + np.arange(count) * ((axis[-1] - axis[0]) / count)
     return np.minimum(np.searchsorted(axis, begins, side="right") - 1, len(axis) - 2).astype(np.uint32)
 

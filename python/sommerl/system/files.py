@@ -35,6 +35,8 @@ MARKS: tuple[tuple[bytes, bytes], ...] = (
     (b"SMLB", b""),
     (b"FBRD", b""),
     (b"SMRP", b""),
+    (b"# Written by Sommerl\n", b""),
+    (b"{", rb'\A\{\s*"\$schema"[^{}]*"metadata": \{[^{}]*"description": "Written by Sommerl\.'),
     (b"\x89PNG\r\n\x1a\n", rb'tEXtSoftware\0"?Sommerl'),
     (b"v/1\x01", rb"Software\0string\0\x07\0\0\0Sommerl"),
     (b"%PDF-", rb"/Creator \(Sommerl\)"),
