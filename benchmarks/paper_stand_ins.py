@@ -3,7 +3,7 @@
     uv run python benchmarks/paper_stand_ins.py FOLDER LICENSE [--size 16400] [-o python/sommerl/reproduction/stand_ins]
 
 FOLDER holds their NP stand-ins as MERL tables (Zheng et al. 2021), LICENSE is that of the NP set, which is copied. Each
-becomes a compact file of at most so many bytes. Prints how far each is from its table, as docs/method.md tells it.
+becomes a compact file of at most so many bytes. Prints how far each is from its table, as docs/stand_ins.md tells it.
 """
 
 from __future__ import annotations

@@ -19,6 +19,7 @@ from sommerl.reflectance.nodes import NodeLattice
 from sommerl.system.errors import SommerlError
 
 SMALL = Lattice(8, 8, 12)
+PATIENCE = 300  # s, after which what a test waits for is taken to hang: machines may be busy
 
 
 def must_fail(check: Callable[..., Any], *broken: Any) -> None:

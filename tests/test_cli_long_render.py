@@ -6,7 +6,7 @@ import sys
 import time
 
 import pytest
-from helpers import interrupting, run, run_json
+from helpers import PATIENCE, interrupting, run, run_json
 
 from sommerl.commands import console
 from sommerl.render import checkpoint, passes
@@ -78,25 +78,25 @@ def test_killed_and_started_again_it_goes_on_to_the_same_image(tmp_path, kind, b
     whole, path = tmp_path / "whole.exr", tmp_path / "out.exr"
     part = tmp_path / "out.exr.sommerl-part"
     process = start(*options, "-o", path, before=before)
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + PATIENCE
     while not part.exists() and time.monotonic() < deadline:
         time.sleep(0.01)
     if before:
         time.sleep(0.15)  # into the next pass
     process.send_signal(kind)
-    _, err = process.communicate(timeout=60)
+    _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == (-kind if kind == signal.SIGKILL else 130)
     assert part.exists()
     assert not path.exists()
     assert (f"{part}: from here, the same command goes on" in err) == (kind != signal.SIGKILL)
     again = start(*options, "-o", path, before=before)
-    out, err = again.communicate(timeout=60)
+    out, err = again.communicate(timeout=PATIENCE)
     assert (again.returncode, err) == (0, "")
     assert '"resumed": true' in out
     assert ('"variant": "scalar_rgb"' in out) == bool(before)
     assert not part.exists()
     uninterrupted = start(*options, "-o", whole, before=before)
-    out, _ = uninterrupted.communicate(timeout=60)
+    out, _ = uninterrupted.communicate(timeout=PATIENCE)
     assert '"resumed": false' in out
     assert path.read_bytes() == whole.read_bytes()
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers import must_fail
+from helpers import PATIENCE, must_fail
 
 from sommerl import builtin
 from sommerl.system.interrupt import hold_interrupts
@@ -54,7 +54,7 @@ def ended(process, *signals, pause=0.0):
     for number in signals:
         process.send_signal(number)
         time.sleep(pause)
-    _, err = process.communicate(timeout=60)
+    _, err = process.communicate(timeout=PATIENCE)
     return process.returncode, err
 
 
@@ -214,7 +214,7 @@ def test_converting_samples_ends_cleanly_at_any_time(tmp_path):
         caught(process)
         time.sleep(0.25 * step)
         process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=PATIENCE)
         assert (process.returncode, err) in ((130, INTERRUPTED), (0, ""))
         assert {path.name for path in tmp_path.iterdir()} <= {"x.csv", "x.binary", "x.coverage.png"}
         (tmp_path / "x.binary").unlink(missing_ok=True)

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from .system.errors import SommerlError
     from .viewer.notebook import view
 
-__version__ = "0.1.0"
+    __version__: str
+
 
 __all__ = [
     "MERL",
@@ -82,6 +83,8 @@ _MODULES = {
 
 def __getattr__(name: str) -> "Any":
     """A name is imported when it is first asked for: the command line has signals to hold back before NumPy comes."""
+    if name == "__version__":  # which stands in rust/Cargo.toml
+        return import_module(f"{__name__}._core").VERSION
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     found = globals()[name] = getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)

@@ -10,6 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+VERSION: str
+"""The package's, as rust/Cargo.toml has it."""
 STORED: int
 """Stored originals of a unit (the paper's k)."""
 EMPTY: int

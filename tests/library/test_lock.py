@@ -8,7 +8,7 @@ import socket
 from contextlib import ExitStack, suppress
 
 import pytest
-from helpers import must_fail
+from helpers import PATIENCE, must_fail
 
 from sommerl.library import lock
 from sommerl.library.lock import WHOLE, Shard, locked
@@ -107,11 +107,11 @@ def test_a_dead_owner_s_lock_is_taken_by_one_alone(folder, holder):
     process, _ = holder(WHOLE)
     os.kill(process.pid, signal.SIGKILL)
     process.join()
-    start, results = SPAWN.Barrier(3, timeout=60), SPAWN.Queue()
+    start, results = SPAWN.Barrier(3, timeout=PATIENCE), SPAWN.Queue()
     racers = [SPAWN.Process(target=race, args=(folder, start, results)) for _ in range(3)]
     for racer in racers:
         racer.start()
-    found = sorted(results.get(timeout=60) for _ in racers)
+    found = sorted(results.get(timeout=PATIENCE) for _ in racers)
     for racer in racers:
         racer.join()
     assert found == ["had it", "refused", "refused"]

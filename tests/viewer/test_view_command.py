@@ -14,7 +14,7 @@ import numpy as np
 import page_files
 import pytest
 from browser import DESKTOP
-from helpers import compact_material, complaint, lambertian_table, must_fail, run, run_json
+from helpers import PATIENCE, compact_material, complaint, lambertian_table, must_fail, run, run_json
 
 from sommerl import TrainOptions, save, train
 from sommerl.commands import view
@@ -209,7 +209,7 @@ def serve():
 def check_ended(process, number):
     """As all commands end that are interrupted."""
     process.send_signal(number)
-    out, err = process.communicate(timeout=20)
+    out, err = process.communicate(timeout=PATIENCE)
     assert (process.returncode, out, err) == (130, "", "error: interrupted; nothing was left half-written\n")
 
 
@@ -234,7 +234,7 @@ def test_with_json_the_address_comes_first(serve, grey):
     assert (result["output"], result["label"], result["warnings"]) == (None, "lambertian", [])
     port = result["url"].removeprefix("http://127.0.0.1:").removesuffix("/")
     other = serve(grey, "--no-open", "--port", port)
-    out, err = other.communicate(timeout=60)
+    out, err = other.communicate(timeout=PATIENCE)
     assert (other.returncode, out) == (2, "")
     assert err.startswith(f"error: --port: expected a free port, found {port} (")
     check_ended(process, signal.SIGINT)

@@ -31,6 +31,12 @@ class Atlas:
     materials: compressed by the preset compact. samplers: one for each material, fitted to it if None.
 
     Raises MaterialError if there is no material, for one that is not compact, and for another number of samplers.
+
+    >>> nickel, paint = (sommerl.compress(sommerl.load(name), target_size=600, effort=1)[0]
+    ...                  for name in ("nickel", "blue-metallic-paint"))
+    >>> atlas = Atlas([nickel, paint])
+    >>> atlas.eval([0, 0, 1], [0, 0, 1], [0, 1]).shape  # the same directions, of both materials
+    (2, 3)
     """
 
     names: tuple[str, ...]  #: of the materials

@@ -30,6 +30,10 @@ class SomManBrdf(OnLattice):
     name, options, metrics: what was compressed, how, and how well. source_sha256, made_from: see `origin.Source`.
 
     Raises MaterialError if the parts do not fit, or an index lies outside of the palette.
+
+    >>> material, _ = sommerl.train(sommerl.load_table("nickel"), sommerl.TrainOptions(clusters=16, epochs=1))
+    >>> material.clusters, material.index.shape, material.lut.shape
+    (16, (90, 90, 180), (16, 3))
     """
 
     kind = "som-man"

@@ -2,7 +2,7 @@
 
 As in Ngan, Durand & Matusik 2005, "Experimental Analysis of BRDF Models", EGSR, and in the paper, parameters have
 bounds, and channels have their own albedos but share the shapes. If the loss is linear in f_r, the best albedos for
-given shapes are computed directly, and only the shapes are searched; docs/method.md compares this with searching for
+given shapes are computed directly, and only the shapes are searched; docs/models.md compares this with searching for
 both.
 """
 

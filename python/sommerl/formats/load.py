@@ -20,6 +20,9 @@ def load(source: str | Path) -> Brdf:
     Of a library of materials, "FILE.smrlib:NAME" is one; of an archive of neural BRDFs, "FILE.npz:NAME"; of a file of
     fits, "FILE.json:MODEL". Raises FormatError for a file in no known format, MaterialError for a name that is neither
     file nor built-in.
+
+    >>> load("nickel").name
+    'nickel (SGD stand-in)'
     """
     path, member = split_member(source)
     if not os.path.isfile(path) and str(source) in NAMES:
@@ -38,5 +41,9 @@ def load(source: str | Path) -> Brdf:
 
 
 def load_table(source: str | Path) -> BrdfTable:
-    """The material as a table on its own lattice; a formula is evaluated at the cell centres of MERL's."""
+    """The material as a table on its own lattice; a formula is evaluated at the cell centres of MERL's.
+
+    >>> load_table("nickel").values.shape
+    (90, 90, 180, 3)
+    """
     return BrdfTable.of(load(source))

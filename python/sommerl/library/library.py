@@ -51,6 +51,10 @@ class Library(Mapping[str, SomManBrdf]):
 
     Threads may ask at the same time. Raises MaterialError for what is no library, FormatError for a damaged one, and
     MissingDependencyError without a package that an address needs.
+
+    >>> library = Library("metals.smrlib")
+    >>> library.names, library["nickel"].compressed
+    (['blue', 'nickel'], True)
     """
 
     def __init__(self, path: str | Path, *, cache: int = CACHE) -> None:

@@ -29,7 +29,11 @@ NAMES = (
 
 
 def builtin(name: str) -> ShiftedGamma:
-    """A built-in material, as a formula. Raises MaterialError, with the most similar name or all, for other names."""
+    """A built-in material, as a formula. Raises MaterialError, with the most similar name or all, for other names.
+
+    >>> builtin("nickel").kind
+    'model'
+    """
     if name not in _FITS:
         hint = did_you_mean(name, NAMES) or f"; built-in are {', '.join(NAMES)}"
         raise MaterialError(f"{name}: expected a file or a built-in material, found neither{hint}")
@@ -40,6 +44,9 @@ def builtin_table(name: str, *, noise: int | None = None, lattice: Lattice = MER
     """A built-in material as a table: its formula at the cell centres of a lattice.
 
     noise: None for no noise, or a seed: see `noisy`.
+
+    >>> builtin_table("nickel", lattice=Lattice(8, 8, 12)).values.shape
+    (8, 8, 12, 3)
     """
     table = BrdfTable.sampled(builtin(name), lattice)
     return table if noise is None else noisy(table, noise)

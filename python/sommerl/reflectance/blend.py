@@ -22,7 +22,12 @@ FIRST, SECOND = "first_", "second_"  # before the names of both materials' buffe
 
 
 def blend(first: Brdf, second: Brdf, weight: float) -> Brdf:
-    """The blend of two BRDFs. weight: of the second, from 0 to 1. Raises OptionError for another."""
+    """The blend of two BRDFs. weight: of the second, from 0 to 1. Raises OptionError for another.
+
+    >>> between = blend(sommerl.load("nickel"), sommerl.load("chrome"), 0.3)
+    >>> between.eval([0, 0, 1], [0, 0, 1]).shape
+    (3,)
+    """
     return BlendedBrdf(first, second, weight)
 
 

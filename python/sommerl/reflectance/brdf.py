@@ -38,6 +38,10 @@ class Brdf(ABC):
     """An isotropic BRDF. A subclass gives one formula, which runs on NumPy and on Dr.Jit arrays.
 
     name: for people. source: of its data. file_sha256: of the file that a compressed material was read from, or "".
+
+    >>> nickel = sommerl.load("nickel")
+    >>> isinstance(nickel, Brdf), nickel.kind, nickel.reciprocal
+    (True, 'model', True)
     """
 
     kind: ClassVar[str] = "model"  #: "table", "som-man", "factored", "measurement" or "model"
@@ -97,7 +101,11 @@ class Brdf(ABC):
         return sum(buffer.nbytes for buffer in self.buffers().values())
 
     def info(self) -> Info:
-        """What the material is; the fields of `Info` that a kind of material does not have are None."""
+        """What the material is; the fields of `Info` that a kind of material does not have are None.
+
+        >>> sommerl.load("nickel").info().kind
+        'model'
+        """
         facts = self.facts
         return Info(
             kind=self.kind,
@@ -144,6 +152,9 @@ class Brdf(ABC):
         Shapes broadcast. NaN where a component of either is NaN or infinite; else 0 where either is not above the
         horizon, z > 0; else a finite number. Nothing is normalised: what vectors of other lengths give means nothing,
         but it is finite. Raises ValueError for other shapes, and for what are not real numbers.
+
+        >>> sommerl.load("nickel").eval([0, 0, 1], [[0, 0, 1], [0, 0.6, 0.8]]).shape
+        (2, 3)
         """
         light, viewer = vectors("eval", wi, wo)
         buffers = self.buffers()
@@ -156,6 +167,10 @@ class Brdf(ABC):
         Returns wi (..., 3), their densities [1/sr] (...), and their weights f_r cos θ_i / density (..., 3), whose mean
         is the albedo. Density and weight are 0 where nothing was drawn; all three are NaN where `wo` or `u` is not
         finite. Raises ValueError for other shapes, for what are not real numbers, and for `u` outside of [0, 1].
+
+        >>> wi, pdf, weight = sommerl.load("nickel").sample([0, 0.6, 0.8], [0.2, 0.5, 0.7])
+        >>> wi.shape, pdf.shape, weight.shape
+        ((3,), (), (3,))
         """
         return self.sampler.sample(wo, u)
 
@@ -163,6 +178,9 @@ class Brdf(ABC):
         """The density [1/sr] with which `sample` draws `wi` for `wo`, shape (...).
 
         Shapes, NaN and errors are as in `eval`.
+
+        >>> sommerl.load("nickel").pdf([0, 0, 1], [0, 0.6, 0.8]) > 0
+        np.True_
         """
         return self.sampler.pdf(wi, wo)
 
@@ -172,6 +190,9 @@ class Brdf(ABC):
 
         Linear RGB, shape (..., 3), by quadrature. NaN where `theta` is not finite. Raises ValueError for angles out of
         range.
+
+        >>> sommerl.load("nickel").albedo(0.5).shape
+        (3,)
         """
         return self.sampler.albedo(theta)
 

@@ -29,6 +29,9 @@ class Lattice(AnyLattice):
     theta_h, theta_d, phi_d: number of bins. θ_h bins are equal in √θ_h, the others are equal in the angle.
     reciprocal: φ_d covers [0, π), and a pair of directions falls into the same cell in both orders; otherwise
         φ_d covers [0, 2π).
+
+    >>> Lattice(90, 90, 180).size  # MERL's
+    1458000
     """
 
     theta_h: int = 90

@@ -31,6 +31,10 @@ def reciprocal(brdf: Brdf) -> Brdf:
     since instruments measure f cos θ_i, whose noise a division by a small cosine turns into peaks. Where the mean would
     still reflect more than the larger of 1 and the BRDF's own albedo, it is multiplied by a factor for the light's
     elevation or the viewer's, the smaller of the two, so that it does not.
+
+    >>> both = reciprocal(sommerl.load("nickel"))
+    >>> both.reciprocal
+    True
     """
     return brdf if brdf.reciprocal else ReciprocalBrdf(brdf)
 

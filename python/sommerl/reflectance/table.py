@@ -37,6 +37,12 @@ class BrdfTable(OnLattice):
     source_sha256: of the file that the table was read from; of the values where there is none.
 
     Raises MaterialError if the shape is not the lattice's, or nothing above the horizon is positive.
+
+    >>> import numpy as np
+    >>> lattice = sommerl.Lattice(8, 8, 12)
+    >>> table = BrdfTable(np.full((*lattice.shape, 3), 0.3), lattice, name="paper")
+    >>> table.eval([0, 0, 1], [0, 0, 1])
+    array([0.3, 0.3, 0.3])
     """
 
     kind = "table"

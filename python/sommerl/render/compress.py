@@ -36,6 +36,10 @@ def compress(
 
     Raises OptionError for a size, a PSNR or an effort out of range, or if both targets are given; and MaterialError if
     the target cannot be met.
+
+    >>> small, report = compress(sommerl.load("nickel"), target_size=600, effort=1)
+    >>> sommerl.save(small, "nickel.smrl") <= 600
+    True
     """
     options = CompactOptions(target_size, target_psnr, effort, seed)
     fitted = averaged(brdf) if reciprocal else brdf

@@ -1,6 +1,6 @@
 """Table 1 and Fig. 6: formulas fitted to measured data, and to the paper's representation of it with M = 1000.
 
-The loss is that of Ngan, Durand & Matusik 2005, which the paper says it uses; docs/method.md discusses the evidence for
+The loss is that of Ngan, Durand & Matusik 2005, which the paper says it uses; docs/models.md discusses the evidence for
 that. Formulas are fitted to tables with trilinear lookup, since they cannot follow the steps between cells. Each error
 is measured against what the formula was fitted to.
 """

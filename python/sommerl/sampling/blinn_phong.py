@@ -34,7 +34,7 @@ class BlinnPhongSampler(Sampler):
     def fitted(cls, brdf: Brdf) -> BlinnPhongSampler:
         """The sampler whose lobe has half of its light within the same θ_h as the material's highlight.
 
-        The highlight is measured across the plane of incidence at θ_d = 22.5° (docs/method.md, *Sampling*).
+        The highlight is measured across the plane of incidence at θ_d = 22.5° (docs/sampling.md).
         """
         theta_h = np.linspace(0.0, 1.4, 1401) ** 2 / 1.4
         wi, wo = directions(theta_h, np.full_like(theta_h, PI / 8), np.full_like(theta_h, PI / 2))

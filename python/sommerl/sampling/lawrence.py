@@ -35,7 +35,7 @@ from ..reflectance.half_diff import TWO_PI
 from .sampler import PI, Sampler
 from .tables import cumulative, inverted
 
-FEW = FactorOptions(4, 2)  # for sampling alone: more terms cost more time than they save (docs/method.md)
+FEW = FactorOptions(4, 2)  # for sampling alone: more terms cost more time than they save (docs/sampling.md)
 DIFFUSE = 0.01  # share of directions that follow the cosine, as in `half_vector`
 
 

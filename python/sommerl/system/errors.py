@@ -12,7 +12,14 @@ LONGEST_UNEXPECTED = 300  # characters of what an error that nobody thought of s
 
 
 class SommerlError(Exception):
-    """An error that the input causes, not the program. Its message is safe to print: it has gone through `visible`."""
+    """An error that the input causes, not the program. Its message is safe to print: it has gone through `visible`.
+
+    >>> try:
+    ...     sommerl.load("nikel")
+    ... except sommerl.SommerlError as error:
+    ...     print("nickel" in str(error))
+    True
+    """
 
     def __init__(self, sentence: str) -> None:
         super().__init__(visible(sentence, LONGEST))

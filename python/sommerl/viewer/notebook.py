@@ -52,6 +52,9 @@ def view(
     height: of the frame in a notebook, in pixels.
 
     Raises MaterialError if there are none, OptionError for sizes and clusters out of range, and what `load` raises.
+
+    >>> shown = view("nickel")  # in a notebook, the last line of a cell shows it
+    >>> shown.save("nickel.html")
     """
     if not materials:
         raise MaterialError("view: expected at least one material, found none")

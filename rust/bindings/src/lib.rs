@@ -44,6 +44,7 @@ fn simd_paths() -> Vec<&'static str> {
 #[pymodule]
 fn _core(module: &Bound<PyModule>) -> PyResult<()> {
     set_hook(Box::new(|_| {})); // nothing on standard error about panics, which `guarded` raises
+    module.add("VERSION", env!("CARGO_PKG_VERSION"))?;
     module.add("STORED", sommerl_kernels::STORED)?;
     module.add("EMPTY", sommerl_kernels::EMPTY)?;
     module.add_class::<learner::Learner>()?;

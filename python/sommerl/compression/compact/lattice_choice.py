@@ -26,7 +26,7 @@ Choices = dict[int, tuple[list[int], float]]  #: for each number of nodes: their
 
 # Numbers of nodes
 SMALLEST, LARGEST = 100, 100_000  # a file holds 131,072 at most (docs/format.md)
-BANDS = 6  # 3, 4 and 9 are within 0.5 dB (docs/method.md)
+BANDS = 6  # 3, 4 and 9 are within 0.5 dB (docs/compact.md)
 # Of rows, and of nodes on an axis of a band. They bound the work; chrome comes to them from 42,000 nodes on.
 MOST_ROWS, MOST_NODES = 90, 44
 FEWEST_ROWS = 5  # fewer than are ever chosen: the smallest lattices have 8 (beige-fabric) to 19 rows (chrome)

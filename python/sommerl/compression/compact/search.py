@@ -32,7 +32,7 @@ from .quantise import Problem, Quantised, quantise
 Quality = Callable[[SomManBrdf], float]  #: of a candidate, in decibels
 Progress = Callable[[int, int], None]  #: steps done, steps in all
 
-DEFAULT_PSNR = 48.0  # dB: a little more than the preset `paper` reaches on RGL's materials (docs/method.md)
+DEFAULT_PSNR = 48.0  # dB: a little more than the preset `paper` reaches on RGL's materials (docs/compact.md)
 SMALLEST_SIZE, LARGEST_SIZE = 300, 64_000  # bytes: readers have to accept what is written (docs/format.md)
 LOWEST_PSNR, HIGHEST_PSNR = 20.0, 80.0  # dB: at 80, one 8-bit value in 1,500 differs by 1
 

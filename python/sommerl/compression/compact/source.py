@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 # At least. With 12, files of 32,000 bytes have 0.4 to 1.1 dB less (chm_orange, aurora_white), and take 6 % less time.
 DIRECTIONS_A_NODE = 36
-# Powers of the solid angle and of the cosines in the weights (docs/method.md)
+# Powers of the solid angle and of the cosines in the weights (docs/compact.md)
 SOLID_POWER, COSINE_POWER = 0.75, 0.25
 # A source that differs by less (`distance.sidedness`, `distance.asymmetry`) is taken for mirrored, or for reciprocal;
 # between sides RGL's files differ by 10⁻⁵ at most, between orders by 4 % at least

@@ -31,6 +31,9 @@ class TrainOptions:
         second place, and a third; with `distinct` it takes the place that it has.
 
     Raises OptionError for values outside these.
+
+    >>> TrainOptions(clusters=64).alpha
+    0.02
     """
 
     clusters: int = 256

@@ -34,6 +34,10 @@ class TrainReport:
     units_dropped: units that never won, and are not in the LUT.
     seconds: wall-clock time.
     cells_clamped, energy_clamped, energy_averaged: what the table had to change in the source (`info.Counts`).
+
+    >>> _, report = sommerl.train(sommerl.load_table("nickel"), sommerl.TrainOptions(clusters=16, epochs=2))
+    >>> len(report.quantisation_error), report.units_dropped
+    (2, 0)
     """
 
     quantisation_error: list[float]
@@ -52,6 +56,10 @@ def train(
     The result depends on the table and the options alone. kernels: `sommerl._core`, or `compression.paper.reference`,
     which gives the same bits slowly. Raises MaterialError if the table has fewer distinct colours than
     `options.clusters`.
+
+    >>> material, report = train(sommerl.load_table("nickel"), sommerl.TrainOptions(clusters=16, epochs=1))
+    >>> material.eval([0, 0, 1], [0, 0, 1]).shape
+    (3,)
     """
     options = options or TrainOptions()
     started = time.perf_counter()

@@ -61,6 +61,10 @@ def save(material: SomManBrdf, path: str | Path) -> int:
 
     Raises FormatError for a material that `load` would refuse, MaterialError if `material` is not a compressed one,
     OptionError if the name does not end in .smrl, OSError if the file cannot be written.
+
+    >>> material, _ = sommerl.train(sommerl.load_table("nickel"), sommerl.TrainOptions(clusters=16, epochs=1))
+    >>> save(material, "nickel.smrl") > 1000
+    True
     """
     if not isinstance(material, SomManBrdf):  # pyright: ignore[reportUnnecessaryIsInstance]
         name = getattr(material, "name", "material")

@@ -1,0 +1,22 @@
+"""One version, in rust/Cargo.toml, and what quotes it."""
+
+import re
+from importlib.metadata import version
+from pathlib import Path
+
+from helpers import must_fail
+
+import sommerl
+
+ROOT = Path(__file__).parents[1]
+
+
+def check_quoted(citation):
+    assert re.search(r"^version: (.*)$", citation, re.M)[1] == sommerl.__version__
+
+
+def test_all_say_the_same():
+    assert version("sommerl") == sommerl.__version__
+    citation = (ROOT / "CITATION.cff").read_text("utf-8")
+    check_quoted(citation)
+    must_fail(check_quoted, citation.replace(sommerl.__version__, "0.0.7"))
