@@ -42,7 +42,7 @@ COVERAGE = Lattice(36, 30, 60)  # where that is looked at
 COARSEST = np.radians(
     5.0
 )  # of a grid's usual steps in θ_i; between those of coarser ones, highlights would be seen twice
-NODES_A_SAMPLE, FEWEST_NODES, MOST_NODES = 10, 15_000, 60_000  # of the lattice
+NODES_A_SAMPLE, FEWEST_NODES, MOST_NODES = 20, 15_000, 60_000  # of the lattice
 SAME = 1e-4  # samples whose coordinates agree to that are one, measured several times
 IN_PLANE = np.radians(0.5)  # azimuths between 0 and this, or this and π, lie on neither side of the plane of incidence
 MOST_SAMPLES = 2_000_000
