@@ -73,6 +73,12 @@ def test_a_material_is_written_as_samples(capsys, tmp_path, extension):
     assert np.allclose(found.f_r, builtin("nickel").eval(found.wi, found.wo), rtol=1e-5)
 
 
+def test_tabs(capsys, tmp_path):
+    run_json(capsys, "convert", "nickel", tmp_path / "x.tsv")
+    first = (tmp_path / "x.tsv").read_text().splitlines()[1]
+    assert first.count("\t") == 6
+
+
 def test_a_grid_is_written_at_its_own_angles(capsys, tmp_path):
     values = np.random.default_rng(0).normal(size=(3, 3, 4, 3))
     theta = (np.arange(3) + 0.5) / 3 * np.pi / 2

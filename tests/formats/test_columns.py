@@ -48,7 +48,7 @@ def taken(monkeypatch, tmp_path):
         path = tmp_path / "x.csv"
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
         with monkeypatch.context() as patch, reading(Reading(**how)):
-            patch.setattr(samples, "table_of", lambda path, data, taken, facts: found.extend((taken, facts)))
+            patch.setattr(samples, "material_of", lambda path, data, taken, facts: found.extend((taken, facts)))
             load(path)
         return found
 
@@ -66,6 +66,8 @@ PLANE = np.array([(a, 0, b, 180) for a in range(0, 81, 10) for b in range(-80, 8
 SIGNED = np.hstack([PLANE[:, :1], PLANE[:, 2:3], at(PLANE)])
 AXIS = np.hstack([-PLANE[:, :1], PLANE[:, 2:3], at(PLANE)])
 SPECTRUM = ",".join(f"{nm} nm" for nm in range(400, 701, 20))
+FOUR = NAMES.removesuffix(",r,g,b")
+BACKWARDS = ",".join(SPECTRUM.split(",")[::-1])
 SPECTRAL = np.hstack([GRID, np.repeat(F_R[:, :1], 16, axis=1)])
 UNITS = "deg,deg,deg,deg,1/sr,1/sr,1/sr"
 
@@ -104,7 +106,7 @@ VARIANTS = {
     "preamble with commas": "a,b,c,d,e,f,g\nInstrument,X,,,,,\n" + WHOLE,
     "commented": "# GonioRef\n# " + WHOLE,
     "units": WHOLE.replace("\n", f"\n{UNITS}\n", 1).replace("_deg", "", 4),
-    "D exponents": WHOLE.replace("\n", ",x\n", 1).replace("x\n", "\n") if False else text(NAMES, ROWS).replace("e-", "D-"),
+    "D exponents": "\n".join([NAMES, *(",".join(f"{x:.9e}".replace("e", "D") for x in row) for row in ROWS)]),
     "end": WHOLE + "end of data\n",
     "trailing separators": "\n".join(line + "," for line in WHOLE.splitlines()),
     "CR": WHOLE.replace("\n", "\r"),
@@ -124,8 +126,8 @@ GREY = {
     "R550": text("theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,R550", ROWS[:, :5]),
     "550nm": text("theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,550nm", ROWS[:, :5]),
     "spectrum": text("theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg," + SPECTRUM, SPECTRAL),
-    "spectrum, backwards": text("theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg," + ",".join(SPECTRUM.split(",")[::-1]), SPECTRAL),
-    "factor": text("theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,reflectance factor [%]", np.hstack([GRID, F_R[:, :1] * 100 * np.pi])),
+    "spectrum, backwards": text(f"{FOUR},{BACKWARDS}", SPECTRAL),
+    "factor": text(f"{FOUR},reflectance factor [%]", np.hstack([GRID, F_R[:, :1] * 100 * np.pi])),
 }  # fmt: skip
 
 

@@ -23,7 +23,7 @@ from ..system.errors import FormatError
 from . import sample_text, samples
 from .format import Format
 from .reading import asked
-from .spectra import FROM_XYZ
+from .spectra import from_xyz
 from .text import LARGEST_FILE, decoded
 
 Values = NDArray[np.float64]
@@ -131,7 +131,7 @@ def samples_of(path: Path, data: bytes) -> samples.Found:
         wi, wo = convert(*table.numbers[:, :inputs].T)
     f_r = table.numbers[:, inputs : inputs + outputs]
     if output == "XYZ_COLOR":
-        f_r = f_r @ FROM_XYZ.T
+        f_r = from_xyz(f_r)
     if output == "INV_STERADIAN_COSINE_FACTOR":
         f_r = f_r / np.maximum(wo[:, 2:], SMALLEST_COSINE)
     return _samples(path, table, wi, wo, np.broadcast_to(f_r, (len(f_r), 3)), f"{parametrisation}, {output}")

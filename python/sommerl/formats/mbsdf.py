@@ -81,7 +81,8 @@ def _shape(path: Path, data: bytes, start: int) -> tuple[int, tuple[int, ...]]:
 
 def _grid(path: Path, data: bytes, start: int, *, transmission: bool) -> GridBrdf:
     count, shape = _shape(path, data, start)
-    values = np.frombuffer(data, "<f4", count, start + HEAD.size).astype(np.float64).reshape(shape)
+    with np.errstate(invalid="ignore"):  # of NaN that signals
+        values = np.frombuffer(data, "<f4", count, start + HEAD.size).astype(np.float64).reshape(shape)
     if not np.isfinite(values).all():
         raise FormatError(f"{path}: expected finite numbers, found NaN or infinity")
     thetas, phis = shape[0], shape[2]

@@ -36,14 +36,15 @@ def grid_of(brdf: Brdf) -> Values:
 
 
 def write(rows: Values, path: Path) -> None:
-    """Writes rows of `at_directions`: .npy as they are, in radians; else as text, in degrees."""
+    """Writes rows of `at_directions`: .npy as they are, in radians; else as text, in degrees, with tabs in .tsv."""
     with atomic_write(path) as out:
         if path.suffix.lower() == ".npy":
             np.save(out, rows, allow_pickle=False)
             return
-        out.write(MARK + HEADER)
+        delimiter = "\t" if path.suffix.lower() == ".tsv" else ","
+        out.write(MARK + HEADER.replace(b",", delimiter.encode()))
         degrees = np.concatenate([np.degrees(rows[:, :4]), rows[:, 4:]], axis=1)
-        np.savetxt(out, degrees, "%.9g", ",")
+        np.savetxt(out, degrees, "%.9g", delimiter)
 
 
 def write_grid(brdf: Brdf, path: Path) -> Brdf:

@@ -29,7 +29,7 @@ from .columns import FACTOR, GREY, RGB, WAVELENGTH, XYZ, Column
 from .format import Format
 from .reading import asked
 from .scattered import from_samples
-from .spectra import FROM_XYZ, to_rgb
+from .spectra import from_xyz, to_rgb
 from .text import LARGEST_FILE, decoded
 
 PLAIN = ("theta_i", "phi_i", "theta_o", "phi_o", "r", "g", "b")
@@ -236,7 +236,7 @@ def _values(known: Columns, names: Sequence[str], header: str) -> tuple[NDArray[
             if again:
                 raise FormatError(f"{again[0][1].role}: expected one column, found two{header}")
             values = _scaled([each[0] for each in taken])
-            return values, values if trio is RGB else values @ FROM_XYZ.T, text
+            return values, values if trio is RGB else from_xyz(values), text
     if WAVELENGTH in of_role:
         taken = of_role[WAVELENGTH]
         wavelengths = np.array([each[1].nanometres for each in taken])

@@ -114,7 +114,14 @@ def to_rgb(values: NDArray[np.float64], wavelengths: NDArray[np.float64]) -> NDA
     if len(wavelengths) == 1:
         return np.repeat(values, 3, axis=1)
     order = np.argsort(wavelengths)
-    return values[:, order] @ srgb_weights(wavelengths[order])
+    with np.errstate(over="ignore", invalid="ignore"):  # whoever takes them refuses what is not finite
+        return values[:, order] @ srgb_weights(wavelengths[order])
+
+
+def from_xyz(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Linear sRGB of CIE XYZ, (…, 3)."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return values @ FROM_XYZ.T
 
 
 # IEC 61966-2-1, from CIE XYZ whose white, D65, has Y = 1.

@@ -22,7 +22,7 @@ from ..system import door
 from ..system.errors import FormatError, MaterialError
 from ..system.visible import visible
 from .format import Format
-from .spectra import FROM_XYZ
+from .spectra import from_xyz
 from .text import LARGEST_FILE, decoded, text_of
 
 AXES = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
@@ -54,7 +54,7 @@ def parse(path: Path, data: bytes) -> GridBrdf:
     blocks = [_block(path, lines, counts[1:]) for _ in range(3 if tristimulus else 1)]
     values = np.stack(blocks * (1 if tristimulus else 3), axis=-1)
     if tristimulus:
-        values = values @ FROM_XYZ.T
+        values = from_xyz(values)
     incidence, azimuth, radial = (axes[name] for name in AXES[1:])
     values, azimuth = _one_turn(path, values, azimuth, head["Symmetry"])
     try:
