@@ -117,11 +117,14 @@ def write(brdf: Brdf, path: str | Path) -> None:
         n, m = len(brdf.axes[0]), len(brdf.axes[2])
         own = zip(brdf.axes, _axes(n, m), strict=True)
         if all(len(a) == len(b) and np.allclose(a, b, rtol=0, atol=1e-12) for a, b in own):
-            thetas, phis = n, m
-    values = on_grid(brdf, _axes(thetas, phis), both_sides=not brdf.mirrored)
+            return _save(brdf.values, path)
+    _save(on_grid(brdf, _axes(thetas, phis), both_sides=not brdf.mirrored), path)
+
+
+def _save(values: NDArray[np.float64], path: str | Path) -> None:
+    head = HEAD.pack(1, len(values), values.shape[2])
     with atomic_write(Path(path)) as out:
-        out.write(FIRST_LINE + b"MBSDF_DATA_REFLECTION=\n" + HEAD.pack(1, thetas, phis))
-        out.write(values.astype("<f4").tobytes())
+        out.write(FIRST_LINE + b"MBSDF_DATA_REFLECTION=\n" + head + values.astype("<f4").tobytes())
 
 
 def _write(brdf: Brdf, path: Path) -> Brdf:

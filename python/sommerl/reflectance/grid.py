@@ -182,8 +182,9 @@ def _steps(axis: Values) -> NDArray[np.uint32]:
         return np.zeros(1, np.uint32)
     smallest = float(np.diff(axis).min())
     count = min(int((axis[-1] - axis[0]) / smallest) + 2, MOST_STEPS)
-    begins = axis[0] + np.arange(count) * ((axis[-1] - axis[0]) / count)
-    return np.minimum(np.searchsorted(axis, begins, side="right") - 1, len(axis) - 2).astype(np.uint32)
+    begins = float(axis[0]) + np.arange(count) * (float(axis[-1] - axis[0]) / count)
+    last: NDArray[np.intp] = np.searchsorted(axis, begins, side="right") - 1
+    return np.clip(last, 0, len(axis) - 2).astype(np.uint32)
 
 
 def _place(f: Any, angle: Array, points: int, axis: Any, steps: Any) -> tuple[Array, Array]:
