@@ -623,12 +623,12 @@ def without_table(module: Any) -> Callable[[Path], Any]:
     """A reader of samples that stops before their table, which takes a hundred times as long as reading."""
 
     def load(path: Path) -> Any:
-        original = module.to_table
-        module.to_table = lambda found, **_: found
+        original = module.from_samples
+        module.from_samples = lambda found, **_: found
         try:
             return module.read(path)
         finally:
-            module.to_table = original
+            module.from_samples = original
 
     return load
 

@@ -44,7 +44,7 @@ ROOMS = {
     "compression": "sommerl/compression/**/*.py",
     "sampling": "sommerl/sampling/*.py",
     "the reader of samples": "sommerl/formats/samples.py",
-    "scattered samples": "sommerl/formats/scattered.py",
+    "scattered samples": "sommerl/formats/regression.py",
 }
 TESTS = (
     *("tests/compression", "tests/sampling", "tests/formats/test_samples.py", "tests/formats/test_scattered.py"),

@@ -27,8 +27,11 @@ def samples(tmp_path):
 
 
 def test_samples_to_a_table_and_a_picture(capsys, samples, tmp_path):
-    result = run_json(capsys, "convert", samples, tmp_path / "out.binary")
+    status, out, _ = run(capsys, "convert", samples, tmp_path / "out.binary", "--json")  # a warning is due
+    result = json.loads(out)
+    assert status == 0
     assert result["facts"]["samples"] == len(A)
+    assert result["samples_report"]["all"]["median"] < 0.05
     assert 0 < result["facts"]["coverage"] <= 1
     assert result["coverage_image"] == str(tmp_path / "out.coverage.png")
     assert (tmp_path / "out.coverage.png").read_bytes().startswith(b"\x89PNG")
@@ -45,7 +48,7 @@ def test_a_picture_that_cannot_be_written_is_told_first(capsys, samples, tmp_pat
 
 def test_what_was_not_measured_is_remembered(capsys, samples, tmp_path):
     assert main(["convert", str(samples), str(tmp_path / "out.smrl")]) == 0
-    assert "share of the hemispheres within 10° of a sample" in capsys.readouterr().out
+    assert "share of the hemispheres" in capsys.readouterr().out
     facts = run_json(capsys, "info", tmp_path / "out.smrl")["facts"]
     assert facts["samples"] == len(A)
     assert 0 < facts["coverage"] <= 1
@@ -55,12 +58,15 @@ def test_what_was_not_measured_is_remembered(capsys, samples, tmp_path):
 def test_mostly_extrapolated(capsys, tmp_path):
     """All of it within 30° of the normal."""
     header = "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,r,g,b"
-    rows = [(i, 0, o, phi, 1, 1, 1) for i in (5, 15, 30) for o in (5, 15, 30) for phi in range(0, 180, 30)]
+    rows = [(i, 0, o, phi, 0.2, 0.2, 0.2) for i in (5, 15, 30) for o in (5, 15, 30) for phi in range(0, 180, 30)]
     np.savetxt(tmp_path / "x.csv", rows, delimiter=",", header=header)
     assert main(["convert", str(tmp_path / "x.csv"), str(tmp_path / "x.binary")]) == 0
-    sentence = f"{tmp_path / 'x.csv'}: most of this material is extrapolated"
-    assert capsys.readouterr().err == f"warning: {sentence}\n"
-    assert run_json_warned(capsys, "convert", tmp_path / "x.csv", tmp_path / "y.bsdf") == [sentence]
+    warned = capsys.readouterr().err
+    assert warned.startswith(f"warning: {tmp_path / 'x.csv'}: ")
+    assert "% of all pairs of directions above the horizon, by solid angles and cosines, are more than 10°" in warned
+    assert warned.count("\n") == 1
+    found = run_json_warned(capsys, "convert", tmp_path / "x.csv", tmp_path / "y.bsdf")
+    assert [f"warning: {sentence}\n" for sentence in found] == [warned]
 
 
 def run_json_warned(capsys, *arguments):
@@ -81,7 +87,7 @@ def test_for_people_too(capsys, samples, tmp_path):
     assert main(["convert", str(samples), str(tmp_path / "out.bsdf")]) == 0
     text = capsys.readouterr().out
     assert "share of the hemispheres within 10° of a sample: 0." in text
-    assert "where samples were missing: " in text
+    assert "samples, and what was written: " in text
     assert "fabric → " in text
 
 

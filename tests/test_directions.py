@@ -4,14 +4,14 @@ from functools import cache
 
 import numpy as np
 import pytest
-from helpers import SMALL, must_fail, random_directions
+from helpers import must_fail, random_directions
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kinds import KINDS
 from sampled import sampler
 
 from sommerl.formats.rgl import RglBrdf
-from sommerl.formats.scattered import to_table
+from sommerl.formats.scattered import fitted_to
 from sommerl.reflectance.brdf import Brdf
 from sommerl.reflectance.samples import Samples
 from sommerl.sampling.named import SAMPLERS
@@ -31,7 +31,7 @@ EACH_SAMPLER = pytest.mark.parametrize("name", SAMPLERS)
 def material(kind):
     if kind != "scattered":
         return KINDS[kind]
-    return to_table(Samples(A, B, KINDS["sgd"].eval(A, B)), name="scattered", lattice=SMALL)
+    return fitted_to(Samples(A, B, KINDS["sgd"].eval(A, B)), name="scattered")
 
 
 def rule(wi, wo):

@@ -139,9 +139,9 @@ def check_no_thread_is_left(query):
 QUERY = """
 import os, signal, sys, threading, time
 import numpy as np
-from sommerl.formats import scattered
+from sommerl.formats import regression
 points = np.random.default_rng(0).random((20000, 4))
-tree, wanted = scattered._tree(points), np.random.default_rng(1).random((60000, 4))
+tree, wanted = regression.tree(points), np.random.default_rng(1).random((60000, 4))
 signal.signal(signal.SIGINT, signal.default_int_handler)
 threading.Timer(0.05, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
 try:
@@ -154,7 +154,7 @@ except KeyboardInterrupt:
 
 
 def test_threads_of_others_are_waited_for():
-    check_no_thread_is_left("scattered._planes(tree, points, points[:, :3], wanted)")
+    check_no_thread_is_left("regression.planes(tree, points, points[:, :3], wanted)")
     must_fail(check_no_thread_is_left, "tree.query(wanted, 16, workers=2)")
 
 

@@ -129,7 +129,7 @@ ANGLES = np.stack([T_L, P_L, T_V, P_V], axis=-1)
 @pytest.mark.parametrize("values", ["R,G,B", "465nm,525nm,630nm", "X,Y,Z", "brdf"])
 def test_astm(tmp_path, monkeypatch, values):
     found = []
-    monkeypatch.setattr(samples, "table_of", lambda path, data, taken, facts: found.extend((taken, facts)))
+    monkeypatch.setattr(samples, "material_of", lambda path, data, taken, facts: found.extend((taken, facts)))
     count = values.count(",") + 1
     f_r = np.repeat(F_R, count, 1)
     path = put(tmp_path, astm(f"theta_i,phi_i,theta_s,phi_s,{values}", np.hstack([ANGLES, f_r])), "x.astm")

@@ -48,7 +48,7 @@ def taken(monkeypatch, tmp_path):
         path = tmp_path / "x.csv"
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
         with monkeypatch.context() as patch, reading(Reading(**how)):
-            patch.setattr(samples, "table_of", lambda path, data, taken, facts: found.extend((taken, facts)))
+            patch.setattr(samples, "material_of", lambda path, data, taken, facts: found.extend((taken, facts)))
             load(path)
         return found
 

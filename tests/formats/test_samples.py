@@ -27,7 +27,7 @@ def parsed(monkeypatch, tmp_path):
     def run(content, name="x.csv"):
         found = []
         with monkeypatch.context() as patch:
-            patch.setattr(samples, "table_of", lambda path, data, taken, facts: found.append(taken))
+            patch.setattr(samples, "material_of", lambda path, sha256, taken, facts: found.append(taken))
             (tmp_path / name).write_bytes(content.encode() if isinstance(content, str) else content)
             load(tmp_path / name)
         return found[0]
@@ -245,5 +245,5 @@ def test_damaged_bytes_never_end_in_anything_but_a_sentence(tmp_path, data):
     path = tmp_path / "x.csv"
     path.write_bytes(bytes(whole))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(samples, "table_of", lambda path, data, taken, facts: taken)
+        patch.setattr(samples, "material_of", lambda path, sha256, taken, facts: taken)
         check_sentence(complaint(load, path), "x.csv")

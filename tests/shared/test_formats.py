@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers import random_directions
+from helpers import must_fail, random_directions
 
 from sommerl import BrdfTable, load
 from sommerl.formats import rgl, rgl_export
@@ -13,6 +13,7 @@ from sommerl.reflectance.brdf import Brdf
 from sommerl.reflectance.gamut import without_negatives
 from sommerl.reflectance.reciprocal import reciprocal
 from sommerl.render.compare import compare_on_sphere
+from sommerl.render.compress import compress
 from sommerl.render.environment import default_environment
 from sommerl.render.judge import Judge
 from sommerl.render.llvm import drjit, mitsuba
@@ -87,14 +88,32 @@ def test_stand_ins_as_rgl_files(stand_in, tmp_path, name):
     assert psnr(source, InMitsuba(tmp_path / "x.bsdf")) >= 45
 
 
-@pytest.mark.parametrize("name", ["acryl_blue", "cayman", "mystique"])
+# Of planes with tricube weights alone, over θ_d: what single samples that are held out must not be worse than
+CORNELL = {"acryl_blue": 0.070, "cayman": 0.065, "mystique": 0.097}
+
+
+@pytest.mark.parametrize("name", CORNELL)
 def test_cornell(name):
-    table = load(DATA / "cornell" / f"{name}.brdf")
-    assert table.facts["samples"] == 1439
-    assert table.facts["mirrored"]
-    assert table.facts["held_out_median_relative_error"] < 0.15
-    wi, wo = random_directions(1000, 1), random_directions(1000, 2)
-    assert np.allclose(table.eval(wi, wo), table.eval(wo, wi), rtol=1e-12)
+    facts = load(DATA / "cornell" / f"{name}.brdf").facts
+    assert facts["samples"] == 1439
+    assert facts["mirrored"]
+    assert facts["held_out_median_relative_error"] < CORNELL[name]
+    assert facts["held_out_lines_median_relative_error"] < 0.25
+
+
+def check_peak(brdf, samples):
+    brightest = samples.f_r[:, 0].argmax()
+    found = brdf.eval(samples.wi[brightest], samples.wo[brightest])
+    assert np.allclose(found, samples.f_r[brightest], rtol=0.05)
+
+
+@pytest.mark.parametrize("path", sorted((DATA / "alta").glob("*.dat")), ids=lambda path: path.stem)
+def test_tapes_keep_their_peak(path):
+    source = load(path)
+    material, report = compress(source, target_size=2700)
+    assert report.tried[-1][0] <= 2700
+    check_peak(material, source.samples)
+    must_fail(check_peak, BrdfTable.of(source), source.samples)  # MERL's cells are too wide
 
 
 def test_neural_fits_are_the_stand_ins(nbrdf_stand_in):

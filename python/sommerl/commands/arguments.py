@@ -14,7 +14,7 @@ from dataclasses import MISSING, Field, dataclass, field, fields
 from fractions import Fraction
 from typing import Any, Literal, NewType, TypeVar, get_args, get_origin, get_type_hints
 
-from ..formats.reading import MOST_DROPPED
+from ..formats.reading import MOST_DROPPED, PhiFrom, Values
 from ..system import threads
 from ..system.errors import OptionError
 
@@ -83,6 +83,16 @@ class ReadingArguments(Arguments):
         default=MOST_DROPPED,
         metavar="SHARE",
         help="of tables of samples: the most rows that are left out, without numbers or below the horizon",
+    )
+    values: Values = option(
+        default="f_r",
+        help="of tables of samples: what values are: f_r [1/sr], f_r times cos θ_o, or reflectance factors, π f_r, "
+        "also in percent (%(default)s)",
+    )
+    phi_from: PhiFrom = option(
+        default="retro",
+        help="of tables of samples: where the viewer's azimuth is 0: on the side of the light, or of the mirror's "
+        "direction (%(default)s)",
     )
 
 

@@ -119,7 +119,7 @@ def _reading(options: Any) -> Reading:
     if not isinstance(options, ReadingArguments):
         return Reading()
     with named_as_typed():
-        return Reading(options.columns or (), options.max_dropped)
+        return Reading(options.columns or (), options.max_dropped, options.values, options.phi_from)
 
 
 def _warned(message: Warning | str, *_: Any, **__: Any) -> None:

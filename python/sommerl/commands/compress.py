@@ -26,6 +26,7 @@ from .arguments import Material, ReadingArguments, option, positional
 from .checks import check_output
 from .folders import make_folder
 from .inputs import expanded, is_several, readable, stem
+from .laboratory import ReportArguments, check_samples, reported, warn_of_samples
 from .method_arguments import MethodArguments, chosen_method
 from .outcome import PartlyDone
 from .parser import add_command
@@ -33,7 +34,7 @@ from .rows import changed_rows, fact_rows, judged_rows, origin_rows, table_rows
 
 
 @dataclass(frozen=True, kw_only=True)
-class CompressArguments(ReadingArguments, MethodArguments):
+class CompressArguments(ReportArguments, ReadingArguments, MethodArguments):
     """What `compress` is asked for."""
 
     inputs: tuple[Material, ...] = positional(
@@ -63,6 +64,8 @@ def compress(options: CompressArguments) -> dict[str, Any]:
         kept = readable(sources, options.inputs)
         outputs = [output for source, output in zip(sources, outputs, strict=True) if source in kept]
         sources = kept
+    if options.residuals is not None and len(sources) > 1:
+        raise OptionError(f"--residuals: expected one material, found {len(sources)}")
     results: list[dict[str, Any]] = []
     failed = 0
     for source, output in zip(sources, outputs, strict=True):
@@ -83,9 +86,20 @@ def compress(options: CompressArguments) -> dict[str, Any]:
 def _compressed(
     source: str, output: Path, method: CompactOptions | TrainOptions, options: CompressArguments
 ) -> dict[str, Any]:
+    brdf = load(source)
+    check_samples(options, brdf, source)
+    warn_of_samples(brdf, source)
+
+    def made(other: Brdf) -> Brdf:
+        if isinstance(method, CompactOptions):
+            return compressed(other, **asdict(method), reciprocal=options.reciprocal)[0]
+        return measured.train(BrdfTable.of(other), method)[0]
+
     if isinstance(method, CompactOptions):
-        return compact_one(source, load(source), output, method, options.json, reciprocal=options.reciprocal)
-    return compress_one(source, load(source), output, method, options.json)
+        result = compact_one(source, brdf, output, method, options.json, reciprocal=options.reciprocal)
+    else:
+        result = compress_one(source, brdf, output, method, options.json)
+    return result | reported(source, brdf, output, made, options)
 
 
 def _outputs(sources: Sequence[str], output: Path, *, several: bool) -> list[Path]:

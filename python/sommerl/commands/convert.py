@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..compression.compact.search import CompactOptions
@@ -12,7 +13,7 @@ from ..compression.paper.options import TrainOptions
 from ..formats import registry, rgl, rgl_export, smrl
 from ..formats.format import Format
 from ..formats.load import load
-from ..formats.scattered import ScatteredTable
+from ..formats.scattered import ScatteredBrdf
 from ..models.builtin import NAMES, builtin_table
 from ..plots import coverage
 from ..reflectance.brdf import Brdf
@@ -25,14 +26,13 @@ from .arguments import Material, ReadingArguments, WritingArguments, byte_count,
 from .checks import check_apart, check_output
 from .compress import compact_one, compress_one, fitted, trained
 from .inputs import expanded, is_several, read_all
+from .laboratory import ReportArguments, check_samples, reported, warn_of_samples
 from .parser import add_command
 from .rows import changed_rows, fact_rows
 
-MOSTLY = 0.5
-
 
 @dataclass(frozen=True, kw_only=True)
-class ConvertArguments(ReadingArguments, WritingArguments):
+class ConvertArguments(ReportArguments, ReadingArguments, WritingArguments):
     """What `convert` is asked for."""
 
     inputs: tuple[Material, ...] = positional(
@@ -84,8 +84,8 @@ def converted(brdf: Brdf, kind: Format, options: ConvertArguments) -> dict[str, 
     output: Path = options.output
     kept = reciprocal(brdf) if options.reciprocal else brdf
     report = {} if kind.names_source else _report(brdf, output)
-    if report.get("coverage", 1) < MOSTLY:
-        console.warn(f"{options.input}: most of this material is extrapolated")
+    check_samples(options, brdf, options.input)
+    warn_of_samples(brdf, options.input)
     if kind is smrl.FORMAT and options.target_size is not None:
         result = compact_one(
             options.input, brdf, output, _compact(options), options.json, reciprocal=options.reciprocal
@@ -105,7 +105,21 @@ def converted(brdf: Brdf, kind: Format, options: ConvertArguments) -> dict[str, 
                 console.say(f"  {name}: {value}")
     if not options.json:
         _print_report(report | {"facts": {}} if "epochs" in result else report)
+    if kind.read and not kind.names_source:
+        report |= reported(options.input, brdf, output, lambda other: _again(other, kind, options), options)
+    if isinstance(brdf, ScatteredBrdf) and "coverage_image" in report:
+        coverage(brdf, Path(report["coverage_image"]), load(output) if kind.read and output.is_file() else brdf)
     return answers.of_materials([result | report])
+
+
+def _again(brdf: Brdf, kind: Format, options: ConvertArguments) -> Brdf:
+    """What a file in the format would hold of a material."""
+    kept = reciprocal(brdf) if options.reciprocal else brdf
+    if kind.compressed:
+        return _compressed(kept, options)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / options.output.name
+        return load(path) if _write(kept, kind, replace(options, output=path)) else brdf
 
 
 def _convert_several(options: ConvertArguments, kind: Format) -> dict[str, Any]:
@@ -181,14 +195,13 @@ def _compressed(brdf: Brdf, options: ConvertArguments) -> SomManBrdf:
 
 
 def _report(brdf: Brdf, output: Path) -> dict[str, Any]:
-    """What the reader reports of the data; of samples, a picture of where none were measured is written, too."""
+    """What the reader reports of the data; of samples, it is checked that a picture of them can be written, too."""
     facts = brdf.facts
     result: dict[str, Any] = {"facts": facts} if facts else {}
-    if isinstance(brdf, ScatteredTable):
+    if isinstance(brdf, ScatteredBrdf):
         result["coverage"] = facts["coverage"]
         picture = output.with_name(f"{output.stem}.coverage.png")
         check_output(picture, (".png",))
-        coverage(brdf, picture)
         result["coverage_image"] = str(picture)
     return result
 
@@ -197,7 +210,7 @@ def _print_report(report: dict[str, Any]) -> None:
     for name, value in fact_rows(report.get("facts", {})).items():
         console.say(f"  {name}: {value}")
     if "coverage_image" in report:
-        console.say(f"  where samples were missing: {report['coverage_image']}")
+        console.say(f"  samples, and what was written: {report['coverage_image']}")
 
 
 def _formats() -> str:

@@ -63,9 +63,13 @@ FACTS = {
     "samples_at_the_horizon": "samples at the horizon, left out",
     "mirrored": "one side measured, mirrored to the other",
     "coverage": "share of the hemispheres within 10° of a sample",
-    "cells_not_measured": "cells farther from all samples, extrapolated",
+    "samples_merged": "samples that repeated others",
+    "one_sided": "both orders of the directions kept apart",
     "held_out_log_error_cosine": "every tenth sample held out: RMS error of the logarithm, cosine-weighted",
     "held_out_median_relative_error": "every tenth sample held out: median relative error",
+    "held_out_lines_log_error_cosine": "lines of incidence held out: RMS error of the logarithm, cosine-weighted",
+    "held_out_lines_median_relative_error": "lines of incidence held out: median relative error",
+    "grid_points_missing": "points of the grid that were not measured, interpolated",
 }
 
 

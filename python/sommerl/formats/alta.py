@@ -7,6 +7,7 @@ V is our viewer, its light L our light.
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -14,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..reflectance.brdf import Brdf
 from ..reflectance.half_diff import directions, spherical
 from ..reflectance.samples import Samples
-from ..reflectance.table import BrdfTable
 from ..system import door
 from ..system.errors import FormatError
 from . import sample_text, samples
@@ -90,15 +91,15 @@ def looks_like(head: bytes) -> bool:
     return re.search(r"^#\s*PARAM_IN\s", decoded(head), re.MULTILINE) is not None and b"\0" not in head
 
 
-def read(path: str | Path) -> BrdfTable:
-    """The table of a file. Raises FormatError if it is not one, MissingDependencyError without SciPy."""
+def read(path: str | Path) -> Brdf:
+    """The material of a file. Raises FormatError if it is not one, MissingDependencyError without SciPy."""
     return parse(Path(path), door.read(path, LARGEST_FILE))
 
 
-def parse(path: Path, data: bytes) -> BrdfTable:
+def parse(path: Path, data: bytes) -> Brdf:
     """As `read`, from the file's bytes; the path is for names and messages alone."""
     found = samples_of(path, data)
-    return samples.table_of(path, data, found.samples, found.facts)
+    return samples.material_of(path, hashlib.sha256(data).hexdigest(), found.samples, found.facts)
 
 
 def samples_of(path: Path, data: bytes) -> samples.Found:

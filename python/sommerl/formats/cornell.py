@@ -1,7 +1,7 @@
 """Cornell's .brdf files: scattered spectral samples (Program of Computer Graphics, as distributed with pbrt).
 
 Text, of which "#" starts a comment: the number of wavelengths; the wavelengths [nm]; then, for each sample, θ_i φ_i
-θ_o φ_o [rad] and a reflectance at each wavelength. Spectra become linear sRGB, and samples a table (`scattered`).
+θ_o φ_o [rad] and a reflectance at each wavelength. Spectra become linear sRGB, and samples a material (`scattered`).
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ..reflectance.brdf import Brdf
 from ..reflectance.samples import Samples
-from ..reflectance.table import BrdfTable
 from ..system import door
 from ..system.errors import FormatError
 from ..system.visible import visible
 from .format import Format
-from .scattered import to_table
+from .scattered import from_samples
 from .spectra import srgb_weights
 from .text import LARGEST_FILE, rows, text_of, uncommented
 
@@ -31,12 +31,12 @@ def looks_like(head: bytes) -> bool:
     return bool(lines) and re.fullmatch(r"[0-9]{1,9}", lines[0]) is not None
 
 
-def read(path: str | Path) -> BrdfTable:
-    """The table of a Cornell file. Raises FormatError if it is not one, MissingDependencyError without `formats`."""
+def read(path: str | Path) -> Brdf:
+    """The material of a Cornell file. Raises FormatError if it is not one, MissingDependencyError without `formats`."""
     return parse(Path(path), door.read(path, LARGEST_FILE))
 
 
-def parse(path: Path, data: bytes) -> BrdfTable:
+def parse(path: Path, data: bytes) -> Brdf:
     """As `read`, from the file's bytes; the path is for names and messages alone."""
     lines = uncommented(text_of(path, data))
     if not lines or not re.fullmatch(r"\d{1,9}", lines[0]) or not 2 <= int(lines[0]) <= MOST_WAVELENGTHS:
@@ -57,7 +57,7 @@ def parse(path: Path, data: bytes) -> BrdfTable:
         raise FormatError(f"{path}: wavelengths: expected {count} that increase [nm], found {len(nanometres)} others")
     samples = rows(path, lines[start:], 4 + count)
     try:
-        return to_table(
+        return from_samples(
             Samples.at_angles(samples[:, :4], samples[:, 4:] @ srgb_weights(nanometres)),
             name=visible(path.stem),
             source_sha256=hashlib.sha256(data).hexdigest(),

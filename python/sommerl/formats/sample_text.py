@@ -173,8 +173,10 @@ def _numbers(
     path: Path, rows: Sequence[tuple[int, str]], names: Sequence[str], used: Sequence[int], delimiter: str | None
 ) -> NDArray[np.float64]:
     """The numbers in rows: quickly if NumPy can read them all, else cell by cell."""
-    numbers = np.full((len(rows), len(names)), np.nan)
     quick = _quickly([line for _, line in rows], len(names), used, delimiter)
+    if quick is not None and list(used) == list(range(len(names))):
+        return quick  # and no second array, which long files would have to find room for
+    numbers = np.full((len(rows), len(names)), np.nan)
     if quick is not None:
         numbers[:, used] = quick
         return numbers

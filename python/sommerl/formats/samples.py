@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..reflectance.brdf import Brdf
 from ..reflectance.samples import Samples
-from ..reflectance.table import BrdfTable
 from ..system import door
 from ..system.errors import FormatError
 from ..system.visible import visible
@@ -28,7 +28,7 @@ from . import columns, numpy_files, sample_files, sample_text
 from .columns import FACTOR, GREY, RGB, WAVELENGTH, XYZ, Column
 from .format import Format
 from .reading import asked
-from .scattered import to_table
+from .scattered import from_samples
 from .spectra import from_xyz, to_rgb
 from .text import LARGEST_FILE, decoded
 
@@ -62,25 +62,25 @@ def are_columns(names: Any) -> bool:
     return any(map(columns.is_angle, names))
 
 
-def read(path: str | Path) -> BrdfTable:
-    """The table of a file of samples. Raises FormatError if it is not one, MissingDependencyError without SciPy."""
+def read(path: str | Path) -> Brdf:
+    """The material of a file of samples. Raises FormatError if it is not one, MissingDependencyError without SciPy."""
     return parse(Path(path), door.read(path, max(LARGEST_FILE, numpy_files.LARGEST_FILE)))
 
 
-def parse(path: Path, data: bytes) -> BrdfTable:
+def parse(path: Path, data: bytes) -> Brdf:
     """As `read`, from the file's bytes; the path is for names and messages alone."""
+    sha256 = hashlib.sha256(data).hexdigest()
     found = samples_of(path, data)
-    return table_of(path, data, found.samples, found.facts)
+    del data  # long files take as much memory as what is made of them
+    return material_of(path, sha256, found.samples, found.facts)
 
 
-def table_of(path: Path, data: bytes, samples: Samples, facts: Mapping[str, Any]) -> BrdfTable:
-    """The table of samples from a file's bytes."""
+def material_of(path: Path, source_sha256: str, samples: Samples, facts: Mapping[str, Any]) -> Brdf:
+    """The material of samples from a file, whose SHA-256 is given."""
     try:
-        table = to_table(samples, name=visible(path.stem), source_sha256=hashlib.sha256(data).hexdigest())
+        return from_samples(samples, name=visible(path.stem), source_sha256=source_sha256, facts=facts)
     except FormatError as error:
         raise FormatError(f"{path}: {error}") from error
-    table.source_facts = {**table.source_facts, **facts}
-    return table
 
 
 def samples_of(path: Path, data: bytes) -> Found:

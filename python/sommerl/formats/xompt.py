@@ -29,7 +29,7 @@ from ..system.visible import visible
 from .format import Format
 from .grids import axes_of, on_grid, regular
 from .reading import asked
-from .scattered import to_table
+from .scattered import from_samples
 from .spectra import PRIMARIES, WRITTEN, to_rgb
 
 LARGEST_FILE = 2**29  # bytes
@@ -75,11 +75,9 @@ def parse(path: Path, file: door.File) -> Brdf:
             axes, values = found
             return GridBrdf(*axes, values, facts=facts, **named)
         angles = np.insert(directions, 1, 0.0, axis=1)  # φ_i
-        table = to_table(Samples.at_angles(angles, f_r), **named)
+        return from_samples(Samples.at_angles(angles, f_r), facts=facts, **named)
     except (FormatError, MaterialError) as error:
         raise FormatError(f"{path}: {error}") from error
-    table.source_facts = {**table.source_facts, **facts}
-    return table
 
 
 def _parts(path: Path, file: door.File, digest: Any) -> tuple[Table, bytes]:

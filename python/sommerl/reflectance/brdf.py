@@ -26,6 +26,7 @@ from .origin import Source, measured_against
 
 if TYPE_CHECKING:
     from ..sampling.half_vector import HalfVectorSampler
+    from .samples import Samples
 
 Buffers = Mapping[str, Any]
 Vectors = NDArray[np.float64]
@@ -73,6 +74,11 @@ class Brdf(ABC):
     def mirrored(self) -> bool:
         """Whether light from both sides of the viewer's plane gives the same by construction; data may do so, too."""
         return False
+
+    @property
+    def samples(self) -> Samples | None:
+        """The measurements that it was fitted to; None if it was not, or if they are not known any more."""
+        return None
 
     @property
     def lookup(self) -> str:

@@ -48,6 +48,7 @@ MARKS: tuple[tuple[bytes, bytes], ...] = (
     (b"{", rb'\A\{\s*"comment": "Written by Sommerl\.'),
     (b"{", rb'\A\{\s*"sommerl_(paper|cell)"'),
     (b"<!-- ", rb"\A<!-- Written by Sommerl -->"),
+    (b"# ", rb"\A# Written by Sommerl: residuals"),
     (b"<svg ", rb"<!-- Written by Sommerl -->"),
     (b"RIFF", rb"Sommerl"),  # WebP, whose metadata are at its end
 )

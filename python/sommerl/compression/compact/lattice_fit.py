@@ -15,6 +15,8 @@ from .lattice_choice import LatticeChoice
 from .quantise import Problem
 from .source import FittedSource, folds_of
 
+SAMPLED_LINES = 32  # that errors are measured on where the nodes are many
+
 
 class Fitter:
     """Prepares a material once, and then fits lattices of any size to it.
@@ -51,6 +53,18 @@ class Fitter:
         """The least-squares problem on such a lattice, with its solution. Raises MaterialError if `nodes` is not from
         SMALLEST to LARGEST."""
         return self._source.problem(self._choice.lattice(nodes))
+
+
+def fitted_to_samples(brdf: Brdf, nodes: int) -> FittedTable:
+    """A material that was fitted to samples (`Brdf.samples`), on a lattice of its own of at most `nodes` nodes, not
+    quantised: the samples are fitted by least squares, and `brdf` says what is between them.
+
+    Raises MaterialError for a black material, and for one without samples.
+    """
+    random = np.random.Generator(np.random.PCG64(0))
+    source = FittedSource(brdf, {"reciprocal": brdf.reciprocal, "mirrored": brdf.mirrored}, random)
+    lattice = LatticeChoice([source], random, SAMPLED_LINES).lattice(nodes)
+    return FittedTable(lattice, source.at_samples(lattice), source.scale, signed=brdf.signed, name=brdf.name)
 
 
 class SharedFitter:

@@ -47,6 +47,7 @@ MOST_TRIES = 7
 CLOSE = 1.04  # the ratio of sizes at which the search ends: what seven bisections of the whole range lead to
 
 # The search for the best material of a size
+ROOMY, MOST_SPREAD = 0.85, 1.5  # a file that is that much smaller than asked for has room for more nodes, up to so many
 SPARE = (0.8, 0.6)  # of the usual number of nodes, which are tried where a file came out too large
 # Bytes, and the numbers of nodes that are usually best for them. With 0.6 times as many in 2,700 bytes, RGL's
 # irid_flake_paint1 loses 1.5 dB.
@@ -156,9 +157,15 @@ class Compressor:
     def of_size(self, size: int) -> tuple[float, SomManBrdf]:
         """The best material of at most `size` bytes among one for each of the effort's `spread`, and its quality.
 
+        Where the only one is ROOMY, another one has more nodes.
+
         Raises MaterialError if none of them is small enough, nor those of SPARE.
         """
         best = max((self._candidate(size, spread) for spread in self._effort.spread), key=lambda each: each[0])
+        written = self.tried[-1][0]
+        if self._quality and len(self._effort.spread) == 1 and written < ROOMY * size:  # as of grey materials
+            more = self._candidate(size, min(size / written, MOST_SPREAD))
+            best = max(best, more, key=lambda each: each[0])
         for spread in SPARE:
             if best[0] == -math.inf and spread not in self._effort.spread:
                 best = self._candidate(size, spread)
