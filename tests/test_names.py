@@ -60,10 +60,10 @@ def test_samples_with_such_names(capsys, tmp_path, name):
     path.write_bytes(content.encode("utf-8", "replace"))
     result = run_json(capsys, "convert", path, tmp_path / "x.binary")
     assert os.path.exists(result["coverage_image"])
-    path.write_text(content.replace("phi_o_rad", "[b]").encode("utf-8", "replace").decode())
+    path.write_text(content.replace("theta_o_rad", "[bold]").encode("utf-8", "replace").decode())
     status, out, err = run(capsys, "info", path)
     assert (status, out) == (1, "")
-    assert "found none named phi_o" in err
+    assert "theta_o" in err
     check_shown(err)
 
 

@@ -179,8 +179,8 @@ class Brdf(ABC):
 
         Shapes, NaN and errors are as in `eval`.
 
-        >>> sommerl.load("nickel").pdf([0, 0, 1], [0, 0.6, 0.8]) > 0
-        np.True_
+        >>> bool(sommerl.load("nickel").pdf([0, 0, 1], [0, 0.6, 0.8]) > 0)
+        True
         """
         return self.sampler.pdf(wi, wo)
 

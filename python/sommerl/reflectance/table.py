@@ -41,8 +41,8 @@ class BrdfTable(OnLattice):
     >>> import numpy as np
     >>> lattice = sommerl.Lattice(8, 8, 12)
     >>> table = BrdfTable(np.full((*lattice.shape, 3), 0.3), lattice, name="paper")
-    >>> table.eval([0, 0, 1], [0, 0, 1])
-    array([0.3, 0.3, 0.3])
+    >>> table.eval([0, 0, 1], [0, 0, 1]).tolist()
+    [0.3, 0.3, 0.3]
     """
 
     kind = "table"
