@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from shlex import join
 from typing import Any
 
 from ..compression.compact.search import CompactOptions
 from ..compression.material import SomManBrdf
 from ..compression.paper.options import TrainOptions
-from ..formats import registry, rgl, rgl_export, smrl
+from ..formats import registry, rgl, rgl_export, smrl, source_code
 from ..formats.format import Format
 from ..formats.load import load
 from ..formats.scattered import ScatteredTable
@@ -51,6 +52,9 @@ class ConvertArguments(WritingArguments):
         default=False, help="the mean of both orders of the directions, as tables hold it in any case"
     )
     spectral: bool = option(default=False, help=".bsdf: spectra for pbrt-v4 and Mitsuba's spectral variants, not RGB")
+    no_sampler: bool = option(
+        default=False, help="source code: leave out sample and pdf, and their table of 7,680 bytes"
+    )
     noise: int | None = option(
         default=None, metavar="SEED", help="add the measurement error of MERL's data to a built-in material"
     )
@@ -123,7 +127,11 @@ def _convert_several(options: ConvertArguments, kind: Format) -> dict[str, Any]:
 
     check_apart(output, *sources)
     found = read_all(sources, options.inputs, read)
-    write([brdf for _, brdf in found], output)
+    materials = [brdf for _, brdf in found]
+    if kind is source_code.FORMAT:
+        source_code.write_several(materials, output, sampler=not options.no_sampler, command=_command(options))
+    else:
+        write(materials, output)
     size = output.stat().st_size if output.is_file() else None
     if not options.json:
         written_as = "through a pipe" if size is None else console.size(size)
@@ -148,6 +156,8 @@ def checked(options: ConvertArguments) -> Format:
     kind = registry.by_extension(registry.writable(), options.output)
     if options.spectral and kind is not rgl.FORMAT:
         raise OptionError(f"--spectral: expected an output that ends in .bsdf, found {options.output}")
+    if options.no_sampler and kind is not source_code.FORMAT:
+        raise OptionError(f"--no-sampler: expected an output of source code, found {options.output}")
     if kind and kind.names_source and options.noise is not None:
         raise OptionError("--noise: expected an output that holds the material, found a scene snippet")
     if options.reciprocal and kind and kind.names_source:
@@ -170,7 +180,21 @@ def _write(brdf: Brdf, kind: Format, options: ConvertArguments) -> Brdf:
     if options.spectral:
         rgl_export.write(brdf, options.output, spectral=True)
         return brdf
+    if kind is source_code.FORMAT:
+        compressed, sampler = _compressed(brdf, options), not options.no_sampler
+        return source_code.write(compressed, options.output, sampler=sampler, command=_command(options))
     return kind.write(_compressed(brdf, options) if kind.compressed else brdf, options.output)
+
+
+def _command(options: ConvertArguments) -> str:
+    """The command that was typed, with names of files in place of paths, which are nobody's business elsewhere."""
+    words = ["sommerl", "convert", *(Path(each).name or each for each in options.inputs), options.output.name]
+    if options.target_size is not None:
+        words += ["--target-size", str(options.target_size)]
+    if options.noise is not None:
+        words += ["--noise", str(options.noise)]
+    words += ["--reciprocal"] * options.reciprocal + ["--no-sampler"] * options.no_sampler
+    return join(words)
 
 
 def _compressed(brdf: Brdf, options: ConvertArguments) -> SomManBrdf:
