@@ -22,8 +22,6 @@ HOSTILE = """
 #define max
 #define real half
 #define real3 half3
-#define uint unsigned char
-#define atan2 arc
 #define saturate(x) x
 #define PI 3
 #define eval 4
@@ -31,7 +29,6 @@ HOSTILE = """
 #define near
 #define far
 #define wi 1
-#define s 2
 """
 STRICT = ["-std=c++11", "-Wall", "-Wextra", "-Wconversion", "-Werror"]
 MAIN = """

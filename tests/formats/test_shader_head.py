@@ -4,12 +4,12 @@ import re
 
 import numpy as np
 import pytest
-from helpers import compact_material, must_fail, run_json
+from helpers import compact_material, lambertian_table, must_fail, run_json
 from sampled import NODES
 from shader_programs import compact, run
 
 import sommerl
-from sommerl import save
+from sommerl import TrainOptions, save, train
 from sommerl.commands.cli import main
 from sommerl.formats.shader import source as shader
 from sommerl.formats.shader.language import CPP, GLSL, HLSL, MSL, WGSL
@@ -50,7 +50,9 @@ def check_head(text, lines):
 
 
 def test_it_says_which_version_source_quality_and_command(capsys, tmp_path):
-    run_json(capsys, "compress", "nickel", "-o", tmp_path / "n.smrl", "--preset", "compact", "--target-size", "2kB")
+    trained, _ = train(lambertian_table(), TrainOptions(clusters=1, epochs=1))
+    trained.metrics.update(relative_error=0.0123456)
+    save(trained, tmp_path / "n.smrl")
     assert main(["convert", str(tmp_path / "n.smrl"), str(tmp_path / "my n.h"), "--no-sampler"]) == 0
     text = (tmp_path / "my n.h").read_text()
     brdf = sommerl.load(tmp_path / "n.smrl")
@@ -103,3 +105,4 @@ def test_a_size_is_asked_for_where_the_input_is_not_compressed(capsys, tmp_path)
     text = (tmp_path / "x.wgsl").read_text()
     assert "// Command: sommerl convert nickel x.wgsl --target-size 2000" in text
     assert "material_x_gain" in text  # of the preset compact
+    assert re.search(r"^// Quality: .*psnr_soft_db \d+", text, re.M)

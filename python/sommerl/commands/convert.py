@@ -200,7 +200,9 @@ def _command(options: ConvertArguments) -> str:
 def _compressed(brdf: Brdf, options: ConvertArguments) -> SomManBrdf:
     """The material compressed: to the size that is asked for; else as it is, or with the defaults of `compress`."""
     if options.target_size is not None:
-        return fitted(brdf, _compact(options))[0]
+        material, report = fitted(brdf, _compact(options))
+        material.metrics.update(report.metrics)  # for the head of source code
+        return material
     return brdf if isinstance(brdf, SomManBrdf) else trained(BrdfTable.of(brdf), TrainOptions())[0]
 
 
