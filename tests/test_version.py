@@ -1,5 +1,6 @@
 """One version, in rust/Cargo.toml, and what quotes it."""
 
+import json
 import re
 from importlib.metadata import version
 from pathlib import Path
@@ -20,3 +21,4 @@ def test_all_say_the_same():
     citation = (ROOT / "CITATION.cff").read_text("utf-8")
     check_quoted(citation)
     must_fail(check_quoted, citation.replace(sommerl.__version__, "0.0.7"))
+    assert json.loads((ROOT / "javascript" / "package.json").read_text("utf-8"))["version"] == sommerl.__version__
