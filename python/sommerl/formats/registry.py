@@ -63,7 +63,7 @@ def recognised(path: Path, head: bytes) -> Format:
 def listed(formats: Iterable[Format]) -> str:
     """Formats for people, one a line: the extensions, the name, and what is in a file."""
     return "\n".join(
-        f"  {' '.join(each.extensions):22}{each.name}: {each.summary}"
+        f"  {' '.join(each.extensions):21} {each.name}: {each.summary}"
         + (f" (needs sommerl[{each.needs}])" if each.needs else "")
         for each in formats
     )

@@ -33,7 +33,7 @@ class Array:
         """The declaration, and that of what reads it; left out where the including program has defined the latter."""
         name, end = f"@NAME@_{self.name}", language.suffix if self.kind == "real" else ""
         texts = [f"{value}{end}" for value in self.values]
-        lines = ("    " + ", ".join(texts[i : i + A_LINE]) for i in range(0, len(texts), A_LINE))
+        lines = ("    " + ",".join(texts[i : i + A_LINE]) for i in range(0, len(texts), A_LINE))
         kind = language.elements[self.kind]
         constants = language.array.format(type=kind, name=name, size=len(texts), values=",\n".join(lines))
         text = f"{constants}\n{language.reader.format(reader=self.reader, name=name, type=kind)}\n"
