@@ -43,7 +43,21 @@ from sommerl.compression.smrl.codes import gain_values, shape_values
 from sommerl.compression.smrl.shared import Shared
 from sommerl.factored import file as fbrdf
 from sommerl.factored.material import COLUMNS, ELEVATIONS, ROWS, FactoredBrdf
-from sommerl.formats import cornell, fits, merl, nbrdf, numpy_files, samples, smrlib, tensor, text
+from sommerl.formats import (
+    alta,
+    cornell,
+    fits,
+    mbsdf,
+    merl,
+    nbrdf,
+    numpy_files,
+    safetensors,
+    samples,
+    smrlib,
+    tensor,
+    text,
+    xompt,
+)
 from sommerl.models.multi_lobe import FAMILIES, Lobe
 from sommerl.models.nbrdf import SHAPES, WEIGHTS
 from sommerl.reflectance.nodes import NodeLattice
@@ -470,6 +484,80 @@ def hdf5_seeds() -> list[bytes]:
     return files
 
 
+def keras3_seeds() -> list[bytes]:
+    import h5py
+
+    out, archive = io.BytesIO(), io.BytesIO()
+    with h5py.File(out, "w") as file:
+        for number in (1, 2, 3):
+            for place, part in ((0, "fc"), (1, "b")):
+                file[f"layers/dense_{number}/vars/{place}"] = layers()[f"{part}{number}"].astype("f4")
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as copy:
+        copy.writestr("config.json", b"{}")
+        copy.writestr(nbrdf.KERAS, out.getvalue())
+    return [archive.getvalue()]
+
+
+def safetensors_seeds() -> list[bytes]:
+    header: dict[str, Any] = {"__metadata__": {"format": "pt"}}
+    data = b""
+    for name, array in layers().items():
+        part = array.T.astype("<f4").tobytes()
+        place = f"net.{name[-1]}.{'weight' if name[0] == 'f' else 'bias'}"
+        shape = list(array.T.shape)
+        header[place] = {"dtype": "F32", "shape": shape, "data_offsets": [len(data), len(data) + len(part)]}
+        data += part
+    text_of_header = json.dumps(header).encode()
+    return [safetensors.LENGTH.pack(len(text_of_header)) + text_of_header + data]
+
+
+def mbsdf_seeds() -> list[bytes]:
+    values = np.random.default_rng(0).normal(0.3, 0.2, (4, 4, 5, 3)).astype("<f4")
+    head = mbsdf.FIRST_LINE + b"MBSDF_DATA_REFLECTION=\n"
+    grey = head + mbsdf.HEAD.pack(0, 4, 5) + values[..., 0].tobytes()
+    return [head + mbsdf.HEAD.pack(1, 4, 5) + values.tobytes(), grey + b"\nMBSDF_DATA_TRANSMISSION=\n" + bytes(16)]
+
+
+def xompt_seeds() -> list[bytes]:
+    rows = [[nm, a, b, c, 0.3] for nm in (4.5e-7, 6e-7) for a in (0.0, 0.5) for b in (0.1, 1.0) for c in (0.0, 2.0)]
+    content = {"metadata": {"openMaterial3dVersion": "1.0.0"}, "brdf": {"lookupTable": rows, "wavelengths": [1]}}
+    return [json.dumps(content).encode(), json.dumps(content, indent=4).encode()]
+
+
+def zemax_seeds() -> list[bytes]:
+    def axis(name: str, angles: str) -> str:
+        return f"{name}  {len(angles.split())}\n{angles}\n"
+
+    head = "#x\nSource  Measured\nSymmetry  PlaneSymmetrical\nSpectralContent  Monochrome\nScatterType  BRDF\n"
+    axes = axis("SampleRotation", "0") + axis("AngleOfIncidence", "10 40") + axis("ScatterAzimuth", "0 90 180")
+    block = "TIS 0.1\n" + "1.0 0.5 0.1\n" * 3
+    return [f"{head}{axes}{axis('ScatterRadial', '0 20 60')}\nMonochrome\nDataBegin\n{block * 2}DataEnd\n".encode()]
+
+
+def alta_seeds() -> list[bytes]:
+    head = "#DIM {}\n#PARAM_IN {}\n#PARAM_OUT {}"
+    four = head.format("4 3", "SPHERICAL_TL_PL_TV_PV", "XYZ_COLOR")
+    return [table_of_text(four, 3), table_of_text(four.replace("4 3", "4 1").replace("XYZ_COLOR", "INV_STERADIAN"), 1)]
+
+
+def alta_samples(path: Path) -> Any:
+    return alta.samples_of(path, door.read(path, text.LARGEST_FILE)).samples
+
+
+def text_samples(path: Path) -> Any:
+    return samples.samples_of(path, door.read(path, numpy_files.LARGEST_FILE)).samples
+
+
+def csv_seeds() -> list[bytes]:
+    """As people write them."""
+    named = table_of_text(CSV, 3)
+    odd = named.replace(b",", b";").replace(b".", b",").replace(b"\n", b"\r\n")
+    units = named.replace(b"_rad", b"").replace(b"\n", b"\nrad,rad,rad,rad,1/sr,1/sr,1/sr\n", 1)
+    noted = b"Instrument: x\n\n" + named + b"\nend\n"
+    spectral = named.replace(b"r,g,b", b"450,R550,650nm", 1)
+    return [named, odd, units, noted, spectral, named.decode().encode("utf-16"), named.replace(b"e-", b"D-")]
+
+
 def fits_seeds() -> list[bytes]:
     shape = {p.name: (p.low + p.high) / 2 for p in FAMILIES["ggx"].parameters}
     lobes = [Lobe(FAMILIES["lambertian"], (0.1, 0.2, 0.3), {}), Lobe(FAMILIES["ggx"], (0.1, 0.2, 0.3), shape)]
@@ -608,12 +696,20 @@ READERS = [
         numpy_files.LARGEST_FILE, evaluated, zipped,
     ),
     Reader("nbrdf-h5", ".h5", hdf5_seeds, sommerl.load, nbrdf.LARGEST_FILE, evaluated),
+    Reader("nbrdf-keras", ".keras", keras3_seeds, sommerl.load, numpy_files.LARGEST_FILE, evaluated, zipped),
+    Reader("safetensors", ".safetensors", safetensors_seeds, sommerl.load, nbrdf.LARGEST_FILE, evaluated),
+    Reader("mbsdf", ".mbsdf", mbsdf_seeds, sommerl.load, mbsdf.LARGEST_FILE, evaluated),
+    Reader("xompt", ".xompt", xompt_seeds, sommerl.load, xompt.LARGEST_FILE, evaluated),
+    Reader("zemax", ".bsdf", zemax_seeds, sommerl.load, text.LARGEST_FILE, evaluated),
+    Reader("alta", ".dat", alta_seeds, alta_samples, text.LARGEST_FILE, sampled),
     Reader(
-        "samples-csv", ".csv", lambda: [table_of_text(CSV, 3)], without_table(samples), samples.LARGEST_FILE, sampled
+        "astm", ".astm", lambda: [table_of_text(f"NUM_POINTS 40\nVARS {CSV}", 3)], text_samples,
+        numpy_files.LARGEST_FILE, sampled,
     ),
+    Reader("samples-csv", ".csv", csv_seeds, text_samples, numpy_files.LARGEST_FILE, sampled),
     Reader(
         "samples-npz", ".npz", lambda: [npz(**dict(zip(CSV.split(","), rows(3).T, strict=True)))],
-        without_table(samples), numpy_files.LARGEST_FILE, sampled, zipped,
+        text_samples, numpy_files.LARGEST_FILE, sampled, zipped,
     ),
     Reader("samples-table", ".csv", lambda: [table_of_text(CSV, 3)], sommerl.load, text.LARGEST_FILE, evaluated),
     Reader(

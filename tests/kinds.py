@@ -11,6 +11,7 @@ from sommerl.compression.compact.fitted_table import FittedTable
 from sommerl.formats.rgl import RglBrdf
 from sommerl.models.multi_lobe import FAMILIES, MultiLobe
 from sommerl.models.nbrdf import WEIGHTS, NeuralBrdf
+from sommerl.reflectance.grid import GridBrdf
 
 RNG = np.random.default_rng(1)
 VALUES = 0.3 * RNG.random((*SMALL.shape, 3)) ** 4
@@ -24,6 +25,12 @@ def cells(interpolation):
 def rgl():
     a = fields()
     return RglBrdf(a["theta_i"], a["vndf"][0], 0.3 * a["rgb"][0], a["ndf"], a["sigma"], name="rgl")
+
+
+def grid(phi, about_mirror):
+    theta_o = np.array([0.0, 0.1, 0.3, 0.7, 1.2])
+    values = 0.3 * RNG.random((4, len(theta_o), len(phi), 3))
+    return GridBrdf([0.2, 0.5, 1.0, 1.5], theta_o, phi, values, about_mirror=about_mirror, name="grid")
 
 
 def one_lobe(name):
@@ -40,6 +47,9 @@ KINDS = {
     "nodes": compact_material(NODES),
     "fitted": FittedTable(NODES, RNG.random((NODES.size, 3)), 0.02, signed=False, name="fitted"),
     "rgl": rgl(),
+    "grid": grid(np.pi * (np.arange(6) + 0.5) / 6, False),
+    "grid-turn": grid(np.array([0.2, 1.0, 3.0, 4.0, 5.5]), False),
+    "grid-mirror": grid(np.linspace(0, np.pi, 7), True),
     "neural": NeuralBrdf.from_flat(0.3 * RNG.standard_normal(WEIGHTS), name="neural"),
     "sgd": builtin("red-fabric"),
     "factored": made(),

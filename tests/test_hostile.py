@@ -25,7 +25,7 @@ def _script():
 
 
 hostile = _script()
-NATIVE = ("nbrdf-h5", "obj", "ply", "exr", "hdr", "pfm")
+NATIVE = ("nbrdf-h5", "nbrdf-keras", "obj", "ply", "exr", "hdr", "pfm")
 
 
 def check_no_fault(report):

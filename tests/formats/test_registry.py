@@ -8,6 +8,7 @@ from pathlib import Path
 import factored_brdfs
 import h5py
 import numpy as np
+import page_files
 import pytest
 import rgl_files
 from helpers import complaint, lambertian_table, must_fail, random_directions, run
@@ -57,6 +58,29 @@ def written_fits(folder):
     return (folder / "x").read_bytes()
 
 
+def alta():
+    return text("#DIM 4 1\n#PARAM_IN SPHERICAL_TL_PL_TV_PV\n#PARAM_OUT INV_STERADIAN", 1, " ")
+
+
+XOMPT = '"metadata": {"openMaterial3dVersion": "1.0.0"}, "brdf": {"lookupTable": [[5.5e-7, 0.1, 0.2, 0.3, 0.4]]}'
+ZEMAX = """Source Measured
+Symmetry PlaneSymmetrical
+SpectralContent Monochrome
+ScatterType BRDF
+SampleRotation 1
+0
+AngleOfIncidence 1
+10
+ScatterAzimuth 1
+0
+ScatterRadial 2
+0 30
+Monochrome
+DataBegin
+TIS 0.1
+1 0.5
+DataEnd
+"""
 LAMBERTIAN = {"family": "lambertian", "albedo": [0.3, 0.2, 0.1]}
 SAMPLES = "theta_i_rad,phi_i_rad,theta_o_rad,phi_o_rad,r,g,b"
 FIELDS = [(name, "<f8") for name in ("theta_i", "phi_i", "theta_o", "phi_o", "r", "g", "b")]
@@ -67,6 +91,11 @@ FILES = {
     "factored BRDF": lambda _: fbrdf_file.encode(factored_brdfs.even()),
     "MERL": lambda _: merl(),
     "RGL": lambda _: rgl_files.content(),
+    "MDL measured BSDF": lambda _: page_files.mbsdf(np.ones((3, 3, 4, 3))),
+    "OpenMATERIAL 3D": lambda _: ("{" + XOMPT + "}").encode(),
+    "Zemax": lambda _: ZEMAX.encode(),
+    "ALTA": lambda _: alta(),
+    "ASTM E1392": lambda _: text("LAB_NAME x\nVARS theta_i,phi_i,theta_s,phi_s,R,G,B", 3, ","),
     "Cornell": lambda _: text("7\n400 450 500 550 600 650 700", 7, " "),
     "samples": lambda _: text(SAMPLES, 3, ","),
     "NumPy array": lambda _: saved(np.save, WEIGHT),
@@ -109,8 +138,10 @@ def check_extensions_differ(formats):
 
 
 def test_an_extension_names_one_format():
-    check_extensions_differ(readable())
+    # Files of RGL's and of Zemax' have one extension, and are told by their content; the first names the extension.
+    check_extensions_differ([each for each in readable() if each.name != "Zemax"])
     check_extensions_differ(writable())
+    assert by_extension(readable(), Path("x.bsdf")).name == "RGL"
     must_fail(check_extensions_differ, FORMATS)  # .json is read as fits and written as a snippet
 
 

@@ -14,6 +14,7 @@ from dataclasses import MISSING, Field, dataclass, field, fields
 from fractions import Fraction
 from typing import Any, Literal, NewType, TypeVar, get_args, get_origin, get_type_hints
 
+from ..formats.reading import MOST_DROPPED
 from ..system import threads
 from ..system.errors import OptionError
 
@@ -65,6 +66,24 @@ class WritingArguments(Arguments):
     """What every command that writes files can be asked for."""
 
     overwrite: bool = option(default=False, help="replace files that Sommerl did not write, and measurements, too")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadingArguments(Arguments):
+    """What commands that read tables of samples can be asked for."""
+
+    columns: tuple[str, ...] | None = option(
+        default=None,
+        metavar="NAME,NAME,…",
+        read=lambda text: names(text),
+        help="of tables of samples: the names of all columns in their order, in place of those in the file, as "
+        "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,r,g,b",
+    )
+    max_dropped: float = option(
+        default=MOST_DROPPED,
+        metavar="SHARE",
+        help="of tables of samples: the most rows that are left out, without numbers or below the horizon",
+    )
 
 
 def flag(name: str) -> str:
@@ -157,6 +176,14 @@ def number(text: str) -> float:
         return float(text)
     except ValueError:
         raise ArgumentTypeError(f"expected a number, found {text}") from None
+
+
+def names(text: str) -> tuple[str, ...]:
+    """Names between commas."""
+    found = tuple(word.strip() for word in text.split(","))
+    if not all(found):
+        raise ArgumentTypeError(f"expected names between commas, found {text}")
+    return found
 
 
 def byte_count(text: str) -> int:

@@ -10,12 +10,29 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .. import __version__
+from ..formats.reading import Reading, reading
 from ..formats.registry import listed, readable
 from ..models.builtin import NAMES
 from ..system import threads
 from ..system.files import replacing_files
-from . import blend, compare, completion, compress, convert, demo, factor, fit, info, library, paper, plot, render, view
-from .arguments import WritingArguments, read
+from . import (
+    blend,
+    compare,
+    completion,
+    compress,
+    convert,
+    demo,
+    eval,
+    factor,
+    fit,
+    info,
+    library,
+    paper,
+    plot,
+    render,
+    view,
+)
+from .arguments import ReadingArguments, WritingArguments, named_as_typed, read
 from .console import warn
 from .folders import empty_ones_removed
 from .outcome import asks_for_json, outcome
@@ -42,7 +59,23 @@ Examples:
 
 
 # In the order in which help lists them.
-COMMANDS = (demo, compress, info, convert, blend, compare, fit, factor, render, plot, view, library, paper, completion)
+COMMANDS = (
+    demo,
+    compress,
+    info,
+    convert,
+    eval,
+    blend,
+    compare,
+    fit,
+    factor,
+    render,
+    plot,
+    view,
+    library,
+    paper,
+    completion,
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -71,9 +104,22 @@ def _run(typed: Sequence[str]) -> Mapping[str, Any] | None:
         threads.use(threads.checked(options.threads, threads.OPTION))
     threads.limit()
     overwrite = isinstance(options, WritingArguments) and options.overwrite
-    with warnings.catch_warnings(), replacing_files(overwrite=overwrite), empty_ones_removed():
+    with (
+        warnings.catch_warnings(),
+        replacing_files(overwrite=overwrite),
+        empty_ones_removed(),
+        reading(_reading(options)),
+    ):
         warnings.showwarning = _warned
         return found.run(options)
+
+
+def _reading(options: Any) -> Reading:
+    """How tables of samples are to be read."""
+    if not isinstance(options, ReadingArguments):
+        return Reading()
+    with named_as_typed():
+        return Reading(options.columns or (), options.max_dropped)
 
 
 def _warned(message: Warning | str, *_: Any, **__: Any) -> None:

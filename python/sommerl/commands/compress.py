@@ -22,7 +22,7 @@ from ..render.compress import compress as compressed
 from ..render.judge import Judge
 from ..system.errors import OptionError, SommerlError
 from . import answers, console
-from .arguments import Material, option, positional
+from .arguments import Material, ReadingArguments, option, positional
 from .checks import check_output
 from .folders import make_folder
 from .inputs import expanded, is_several, readable, stem
@@ -33,7 +33,7 @@ from .rows import changed_rows, fact_rows, judged_rows, origin_rows, table_rows
 
 
 @dataclass(frozen=True, kw_only=True)
-class CompressArguments(MethodArguments):
+class CompressArguments(ReadingArguments, MethodArguments):
     """What `compress` is asked for."""
 
     inputs: tuple[Material, ...] = positional(

@@ -22,7 +22,7 @@ from ..reflectance.reciprocal import reciprocal
 from ..reflectance.table import BrdfTable
 from ..system.errors import OptionError
 from . import answers, console
-from .arguments import Material, WritingArguments, byte_count, named_as_typed, option, positional
+from .arguments import Material, ReadingArguments, WritingArguments, byte_count, named_as_typed, option, positional
 from .checks import check_apart, check_output
 from .compress import compact_one, compress_one, fitted, trained
 from .inputs import expanded, is_several, read_all
@@ -33,7 +33,7 @@ MOSTLY = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class ConvertArguments(WritingArguments):
+class ConvertArguments(ReadingArguments, WritingArguments):
     """What `convert` is asked for."""
 
     inputs: tuple[Material, ...] = positional(

@@ -11,7 +11,7 @@ from ..formats.load import load
 from ..reflectance.brdf import Brdf
 from ..reflectance.info import Counts
 from . import answers, console
-from .arguments import Arguments, Material, positional
+from .arguments import Material, ReadingArguments, positional
 from .inputs import expanded, readable
 from .parser import add_command
 from .rows import fact_rows, lobe_text, origin_rows, text
@@ -30,7 +30,7 @@ COLUMNS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class InfoArguments(Arguments):
+class InfoArguments(ReadingArguments):
     """What `info` is asked for."""
 
     materials: tuple[Material, ...] = positional(

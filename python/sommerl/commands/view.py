@@ -5,13 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from threading import Thread
 from typing import Any
 
 from ..formats.load import load
-from ..system.errors import MaterialError, OptionError
+from ..system.errors import OptionError
 from ..system.files import atomic_write
 from ..system.first_few import first_few
 from ..system.interrupt import hold_interrupts
@@ -74,7 +73,7 @@ def arguments(add: Any) -> None:
 
 def view(options: ViewArguments) -> dict[str, Any] | None:
     versions = _versions(options)
-    names, references = _references(options, versions)
+    names, references = _references(options)
     shown = [[one, *_compressed(one, versions)] for one in references]
     made = page([one for steps in shown for one in steps]).encode()
     if len(made) > LARGEST_PAGE:
@@ -105,7 +104,7 @@ def _versions(options: ViewArguments) -> list[Version]:
         return asked(options.sizes or (), options.clusters or ())
 
 
-def _references(options: ViewArguments, versions: Sequence[Version]) -> tuple[list[str], list[Held]]:
+def _references(options: ViewArguments) -> tuple[list[str], list[Held]]:
     """The names of the materials, and what the page holds of each, without its versions.
 
     Each is read once, before any is compressed, and only what the page holds is kept.
@@ -116,17 +115,15 @@ def _references(options: ViewArguments, versions: Sequence[Version]) -> tuple[li
     again = next((source for source in found if found.count(source) > 1), None)
     if again:
         raise OptionError(f"MATERIAL: expected different ones, found {again} twice")
-    kept = read_all(found, options.materials, partial(_reference, versions=versions))
+    kept = read_all(found, options.materials, _reference)
     names = [one.label for one in kept]
     made = labels([one.name for one in kept], names)
     return names, [replace(one, label=label, group=label) for one, label in zip(kept, made, strict=True)]
 
 
-def _reference(source: str, versions: Sequence[Version]) -> Held:
+def _reference(source: str) -> Held:
     """A material as the page holds it, called by its own name."""
     as_it_is = held_mbsdf(Path(source)) if os.path.isfile(source) else None
-    if as_it_is and versions:
-        raise MaterialError(f"{source}: expected a material for --sizes and --clusters to compress, found an .mbsdf")
     if as_it_is:
         return as_it_is
     brdf = load(source)

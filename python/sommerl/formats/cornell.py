@@ -40,6 +40,8 @@ def parse(path: Path, data: bytes) -> BrdfTable:
     """As `read`, from the file's bytes; the path is for names and messages alone."""
     lines = uncommented(text_of(path, data))
     if not lines or not re.fullmatch(r"\d{1,9}", lines[0]) or not 2 <= int(lines[0]) <= MOST_WAVELENGTHS:
+        if lines and lines[0].split()[0] == "analytic":
+            raise FormatError(f"{path}: expected samples, found a formula for BRDF Explorer, which is a program")
         found = repr(lines[0][:20]) if lines else "nothing"
         raise FormatError(f"{path}: number of wavelengths: expected 2 to {MOST_WAVELENGTHS}, found {found}")
     count, start = int(lines[0]), 1

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +29,9 @@ def looks_like(head: bytes) -> bool:
     return head.startswith(MAGIC)
 
 
-def arrays(path: Path, data: bytes, top: str, names: tuple[str, ...], most: int) -> dict[str, NDArray[Any]]:
-    """The arrays of floating-point numbers in a file's bytes that have one of the names (without what follows ":" in
-    theirs), by their path, at most `most` numbers each. top: the group to look in; if there is none, everywhere.
+def arrays(path: Path, data: bytes, top: str, wanted: Callable[[str], bool], most: int) -> dict[str, NDArray[Any]]:
+    """The arrays of floating-point numbers in a file's bytes whose paths are wanted, by these, at most `most` numbers
+    each. top: the group to look in; if there is none, everywhere.
 
     Raises FormatError for what is damaged, larger or deeper, MissingDependencyError without h5py.
     """
@@ -43,7 +43,7 @@ def arrays(path: Path, data: bytes, top: str, names: tuple[str, ...], most: int)
             if not isinstance(start, h5py.Group):
                 raise FormatError(f"{path}: {top}: expected a group of layers, found one array")
             for place, item in _items(h5py, path, start):
-                if isinstance(item, h5py.Dataset) and place.rpartition("/")[2].split(":")[0] in names:
+                if isinstance(item, h5py.Dataset) and wanted(place):
                     found[place] = _array(path, place, item, most)
     except FormatError:
         raise

@@ -7,6 +7,8 @@ import math
 import warnings
 import zipfile
 import zlib
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from tokenize import TokenError
 from typing import IO, Any
@@ -41,20 +43,46 @@ def read_npy(path: Path, data: bytes) -> NDArray[Any]:
 
 def read_npz(path: Path, data: bytes) -> dict[str, NDArray[Any]]:
     """The arrays in a .npz file's bytes, by name. Raises FormatError."""
+    with _archive(path, data) as archive:
+        members = archive.infolist()
+        if sum(member.file_size for member in members) > LARGEST_ARRAY:
+            raise FormatError(f"{path}: expected at most {MOST_ARRAYS} arrays of {LARGEST_ARRAY} bytes, found more")
+        arrays: dict[str, NDArray[Any]] = {}
+        for each in members:
+            with archive.open(each) as stream:
+                arrays[each.filename.removesuffix(".npy")] = _array(path, each.filename, stream, each.file_size)
+        return arrays
+
+
+def names(path: Path, data: bytes) -> list[str]:
+    """The names of what is in an archive. Raises FormatError."""
+    with _archive(path, data) as archive:
+        return archive.namelist()
+
+
+def member(path: Path, data: bytes, name: str, most: int) -> bytes:
+    """The bytes of one of an archive's members. Raises FormatError if there are more than `most`."""
+    with _archive(path, data) as archive:
+        if archive.getinfo(name).file_size > most:
+            raise FormatError(f"{path}: {name}: expected at most {most} bytes, found more")
+        with archive.open(name) as stream:
+            found = stream.read(most + 1)
+        if len(found) > most:
+            raise FormatError(f"{path}: {name}: expected at most {most} bytes, found more")
+        return found
+
+
+@contextmanager
+def _archive(path: Path, data: bytes) -> Generator[zipfile.ZipFile]:
+    """An archive. Raises FormatError if it is damaged, holds too many members, or those that are packed otherwise."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = archive.infolist()
-            if len(members) > MOST_ARRAYS or sum(member.file_size for member in members) > LARGEST_ARRAY:
+            if len(members) > MOST_ARRAYS:
                 raise FormatError(f"{path}: expected at most {MOST_ARRAYS} arrays of {LARGEST_ARRAY} bytes, found more")
             if any(member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for member in members):
                 raise FormatError(f"{path}: expected arrays stored or deflated, as NumPy writes them, found others")
-            arrays: dict[str, NDArray[Any]] = {}
-            for member in members:
-                with archive.open(member) as stream:
-                    arrays[member.filename.removesuffix(".npy")] = _array(
-                        path, member.filename, stream, member.file_size
-                    )
-            return arrays
+            yield archive
     # All of these are what zipfile raises for damaged archives: of the directory, the data, its length, an unknown
     # method, encryption, a name that is no text, and a place outside of the file.
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, OSError) as error:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..reflectance.brdf import Brdf
 from ..system.errors import FormatError
-from . import nbrdf, numpy_files, samples
+from . import nbrdf, numpy_files, sample_files, samples
 from .format import Format
 
 
@@ -14,16 +14,20 @@ def _array(path: Path, data: bytes) -> Brdf:
     if not numpy_files.is_array(data):
         raise FormatError(f"{path}: expected a NumPy array, found another kind of file")
     array = numpy_files.read_npy(path, data)
-    sampled = bool(array.dtype.names) or (array.ndim == 2 and array.shape[1] == len(samples.COLUMNS))
-    return samples.parse(path, data) if sampled else nbrdf.parse(path, data)
+    return samples.parse(path, data) if samples.are_samples(array) else nbrdf.parse(path, data)
 
 
 def _archive(path: Path, data: bytes, member: str) -> Brdf:
+    weights = nbrdf.in_archive(path, data)
+    if weights is not None:
+        return nbrdf.parse(path, weights)
     sampled = samples.are_columns(numpy_files.read_npz(path, data))
     return samples.parse(path, data) if sampled else nbrdf.parse(path, data, member)
 
 
 def _members(path: Path, data: bytes) -> list[str]:
+    if nbrdf.in_archive(path, data) is not None:
+        return [""]
     arrays = numpy_files.read_npz(path, data)
     return [""] if samples.are_columns(arrays) else nbrdf.members(arrays)
 
@@ -36,6 +40,7 @@ ARRAY = Format(
     read=_array,
     largest=numpy_files.LARGEST_FILE,
     parts=nbrdf.parts,
+    write=sample_files.write_grid,
 )
 ARCHIVE = Format(
     "NumPy archive",

@@ -6,7 +6,25 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ..system.errors import FormatError
-from . import cornell, fbrdf, fits, merl, nbrdf, numpy_materials, rgl, samples, scene, smrl, smrlib, source_code
+from . import (
+    alta,
+    astm,
+    cornell,
+    fbrdf,
+    fits,
+    mbsdf,
+    merl,
+    nbrdf,
+    numpy_materials,
+    rgl,
+    samples,
+    scene,
+    smrl,
+    smrlib,
+    source_code,
+    xompt,
+    zemax,
+)
 from .format import Format
 
 # In the order in which help and docs list them.
@@ -16,7 +34,12 @@ FORMATS: list[Format] = [
     fbrdf.FORMAT,
     merl.FORMAT,
     rgl.FORMAT,
+    mbsdf.FORMAT,
+    xompt.FORMAT,
+    zemax.FORMAT,
     cornell.FORMAT,
+    alta.FORMAT,
+    astm.FORMAT,
     samples.FORMAT,
     numpy_materials.ARRAY,
     numpy_materials.ARCHIVE,

@@ -107,3 +107,46 @@ def srgb_weights(wavelengths: NDArray[Any]) -> NDArray[np.float64]:
     parts: list[NDArray[np.float64]] = [np.interp(fine, wavelengths, part) for part in np.eye(len(wavelengths))]
     weights = np.stack(parts) @ np.stack(channels, axis=-1)
     return weights / weights.sum(axis=0)
+
+
+def to_rgb(values: NDArray[np.float64], wavelengths: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Linear sRGB (n, 3) of reflectances (n, m) at m different wavelengths [nm], in any order; one alone is grey."""
+    if len(wavelengths) == 1:
+        return np.repeat(values, 3, axis=1)
+    order = np.argsort(wavelengths)
+    with np.errstate(over="ignore", invalid="ignore"):  # whoever takes them refuses what is not finite
+        return values[:, order] @ srgb_weights(wavelengths[order])
+
+
+def from_xyz(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Linear sRGB of CIE XYZ, (…, 3)."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return values @ FROM_XYZ.T
+
+
+# IEC 61966-2-1, from CIE XYZ whose white, D65, has Y = 1.
+FROM_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
+
+# Reflectance spectra of linear sRGB's primaries, at every 20 nm: the smoothest ones (least squares of the differences
+# of neighbours) from 0 to 1 that are 1 in sum and that `srgb_weights` takes back to the primaries, within 3·10⁻⁷.
+WRITTEN = np.arange(390.0, 731.0, 20.0)
+PRIMARIES = np.array([
+    (0.041368, 0, 0.958632),
+    (0.040798, 0, 0.959202),
+    (0.034415, 0, 0.965585),
+    (0.01655, 0, 0.98345),
+    (0.009993, 0.067331, 0.922676),
+    (0, 0.508755, 0.491245),
+    (0, 0.923484, 0.076516),
+    (0, 1, 0),
+    (0, 1, 0),
+    (0, 0.973022, 0.026978),
+    (0.470434, 0.487541, 0.042025),
+    (0.957952, 0.037916, 0.004132),
+    (1, 0, 0),
+    (1, 0, 0),
+    (1, 0, 0),
+    (1, 0, 0),
+    (1, 0, 0),
+    (1, 0, 0),
+])  # fmt: skip

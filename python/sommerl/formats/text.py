@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from pathlib import Path
 
@@ -16,14 +17,32 @@ LINE_ENDS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"  # of str.splitlines
 
 
 def text_of(path: Path, data: bytes) -> str:
-    """The text in a file's bytes. Raises FormatError if it is not text, or has more than MOST_LINES lines."""
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise FormatError(f"{path}: expected text, found another byte at {error.start}") from error
+    """The text in a file's bytes: UTF-8, UTF-16, or else Windows' Latin-1. Raises FormatError if it is not text, or has
+    more than MOST_LINES lines.
+    """
+    text = decoded(data)
+    odd = re.search(r"[\x00-\x08\x0e-\x1b\x7f]", text)
+    if odd:
+        raise FormatError(f"{path}: expected text, found another character at {odd.start()}")
     if sum(text.count(mark) for mark in LINE_ENDS) > MOST_LINES:
         raise FormatError(f"{path}: expected at most {MOST_LINES} lines, found more")
     return text
+
+
+def decoded(data: bytes) -> str:
+    """Bytes as text, whatever they hold; those that begin a file may end within a character."""
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return data.decode("utf-16", "replace")
+    start = data[:200]
+    for odd, coding in ((1, "utf-16-le"), (0, "utf-16-be")):  # without a mark: every other byte is 0
+        if len(start) > 7 and not any(start[odd::2]) and all(start[1 - odd :: 2]):
+            return data.decode(coding, "replace")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        if error.start >= len(data) - 3 and error.reason == "unexpected end of data":
+            return data[: error.start].decode("utf-8-sig")
+        return data.decode("cp1252", "replace")
 
 
 def uncommented(text: str) -> list[str]:

@@ -35,6 +35,8 @@ MARKS: tuple[tuple[bytes, bytes], ...] = (
     (b"SMLB", b""),
     (b"FBRD", b""),
     (b"SMRP", b""),
+    (b"# Written by Sommerl\n", b""),
+    (b"{", rb'\A\{\s*"\$schema"[^{}]*"metadata": \{[^{}]*"description": "Written by Sommerl\.'),
     (b"\x89PNG\r\n\x1a\n", rb'tEXtSoftware\0"?Sommerl'),
     (b"v/1\x01", rb"Software\0string\0\x07\0\0\0Sommerl"),
     (b"%PDF-", rb"/Creator \(Sommerl\)"),
@@ -51,7 +53,7 @@ MARKS: tuple[tuple[bytes, bytes], ...] = (
 )
 WITHIN = 2**14  # bytes at the beginning and at the end of a file in which its mark is searched for
 # Files of these formats may be measurements, whoever wrote them.
-MEASURED = (".binary", ".bsdf", ".brdf", ".npy", ".npz", ".h5", ".hdf5")
+MEASURED = (".binary", ".bsdf", ".brdf", ".mbsdf", ".npy", ".npz", ".h5", ".hdf5")
 
 _replacing: ContextVar[bool] = ContextVar("replacing", default=True)
 
