@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from shlex import join
 from typing import Any
@@ -22,7 +22,16 @@ from ..reflectance.reciprocal import reciprocal
 from ..reflectance.table import BrdfTable
 from ..system.errors import OptionError
 from . import answers, console
-from .arguments import Material, ReadingArguments, WritingArguments, byte_count, named_as_typed, option, positional
+from .arguments import (
+    Material,
+    ReadingArguments,
+    WritingArguments,
+    byte_count,
+    flag,
+    named_as_typed,
+    option,
+    positional,
+)
 from .checks import check_apart, check_output
 from .compress import compact_one, compress_one, fitted, trained
 from .inputs import expanded, is_several, read_all
@@ -30,6 +39,7 @@ from .parser import add_command
 from .rows import changed_rows, fact_rows
 
 MOSTLY = 0.5
+OF_CONTENT = ("columns", "max_dropped", "target_size", "reciprocal", "noise", "no_sampler")  # what a file depends on
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,11 +199,11 @@ def _write(brdf: Brdf, kind: Format, options: ConvertArguments) -> Brdf:
 def _command(options: ConvertArguments) -> str:
     """The command that was typed, with names of files in place of paths, which are nobody's business elsewhere."""
     words = ["sommerl", "convert", *(Path(each).name or each for each in options.inputs), options.output.name]
-    if options.target_size is not None:
-        words += ["--target-size", str(options.target_size)]
-    if options.noise is not None:
-        words += ["--noise", str(options.noise)]
-    words += ["--reciprocal"] * options.reciprocal + ["--no-sampler"] * options.no_sampler
+    for each in fields(options):
+        value = getattr(options, each.name)
+        if each.name in OF_CONTENT and value != each.default:
+            text = ",".join(options.columns or ()) if each.name == "columns" else str(value)
+            words += [flag(each.name)] if value is True else [flag(each.name), text]
     return join(words)
 
 
