@@ -114,7 +114,7 @@ def test_rgl(capsys, path, tmp_path):
     must_fail(check_close, found, expected[::-1])
 
 
-@pytest.mark.parametrize("extension", ["h", "hpp", "glsl", "hlsl"])
+@pytest.mark.parametrize("extension", ["h", "hpp", "glsl", "hlsl", "metal", "wgsl"])
 def test_source_code(capsys, path, tmp_path, extension):
     output = tmp_path / f"x.{extension}"
     result = run_json(capsys, "convert", path, output)
@@ -128,7 +128,7 @@ def check_printed(text, brdf):
 
 def test_source_code_of_what_was_loaded(capsys, path, tmp_path):
     run_json(capsys, "convert", path, tmp_path / "x.h")
-    program = '#include "x.h"\n#include <cstdio>\nint main() { auto f = material_x::eval({0.6, 0, 0.8}, {0, 0, 1}); '
+    program = '#include "x.h"\n#include <cstdio>\nint main() { auto f = material_x_eval({0.6, 0, 0.8}, {0, 0, 1}); '
     program += 'std::printf("%.17g %.17g %.17g", f.x, f.y, f.z); }'
     (tmp_path / "main.cpp").write_text(program)
     subprocess.run([tool("g++"), "-std=c++11", "main.cpp", "-o", "main"], cwd=tmp_path, check=True)

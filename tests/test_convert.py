@@ -166,7 +166,7 @@ def test_reciprocal_averages_both_orders(capsys, negative, tmp_path):
     assert (code > 0, "--reciprocal: expected --preset compact, found paper" in complaint) == (True, True)
 
 
-@pytest.mark.parametrize("extension", ["h", "hpp", "glsl", "hlsl"])
+@pytest.mark.parametrize("extension", ["h", "hpp", "glsl", "hlsl", "metal", "wgsl"])
 def test_source_code(capsys, tmp_path, extension):
     material, _ = train(lambertian_table(), TrainOptions(clusters=1, epochs=1))
     save(material, tmp_path / "x.smrl")

@@ -9,7 +9,7 @@ from helpers import compact_material, must_fail, random_directions, run, run_jso
 
 from sommerl import NAMES, builtin, load, save
 from sommerl.commands.demo import write_page
-from sommerl.formats.shader.source import comment
+from sommerl.formats.shader.head import comment
 from sommerl.plots.contact_sheet import captioned
 from sommerl.plots.page import text
 from sommerl.reflectance.nodes import NodeLattice

@@ -16,25 +16,41 @@ from sommerl.reflectance.nodes import FINE, NodeLattice
 A, B = random_directions(10_000, 1), random_directions(10_000, 2)
 A[:5], B[:5] = A[:5] * [1, 1, -1], B[:5]  # below the horizon
 A[5], B[5:7], A[6] = [0.6, 0, 0.8], [-0.6, 0, 0.8], [0, 0, 1]  # mirror directions
+# What a program may have defined before it includes a file, and what some do.
+HOSTILE = """
+#define min(a, b) ((a) < (b) ? (a) : (b))
+#define max
+#define real half
+#define real3 half3
+#define saturate(x) x
+#define PI 3
+#define eval 4
+#define pdf 5
+#define near
+#define far
+#define wi 1
+"""
+STRICT = ["-std=c++11", "-Wall", "-Wextra", "-Wconversion", "-Werror"]
 MAIN = """
 #include "x.h"
 #include <cstdio>
-typedef SOMMERL_REAL real;
+typedef SOMMERL_REAL number;
 int main() {
     double in[6];
     while (std::fread(in, sizeof(double), 6, stdin) == 6) {
-        const material_x::real3 a{real(in[0]), real(in[1]), real(in[2])}, b{real(in[3]), real(in[4]), real(in[5])};
+        const sommerl_real3 a{number(in[0]), number(in[1]), number(in[2])};
+        const sommerl_real3 b{number(in[3]), number(in[4]), number(in[5])};
         CALL
         std::fwrite(out, sizeof(double), sizeof(out) / sizeof(double), stdout);
     }
 }
 """
 CALLS = {
-    "eval": "const auto f = material_x::eval(a, b); const double out[] = {f.x, f.y, f.z};",
-    "sample": """real pdf;
-        const auto wi = material_x::sample(a, b, pdf);
-        const double out[] = {wi.x, wi.y, wi.z, pdf, material_x::pdf(wi, a)};""",
-    "pdf": "const double out[] = {material_x::pdf(a, b)};",
+    "eval": "const auto f = material_x_eval(a, b); const double out[] = {f.x, f.y, f.z};",
+    "sample": """number density;
+        const auto w = material_x_sample(a, b, density);
+        const double out[] = {w.x, w.y, w.z, density, material_x_pdf(w, a)};""",
+    "pdf": "const double out[] = {material_x_pdf(a, b)};",
 }
 
 
@@ -97,7 +113,7 @@ def run(folder, real, call="eval", a=A, b=B):
     program = folder / sha256((text + (folder / "x.h").read_text()).encode()).hexdigest()
     if not program.exists():  # to compile takes longer than to run
         (folder / "main.cpp").write_text(text)
-        options = ["-std=c++11", "-Wall", "-Wextra", "-Werror", "-o", program.name]
+        options = [*STRICT, "-I.", "-o", program.name]
         defined = ["-fsanitize=undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
         subprocess.run([tool("g++"), *options, *defined, "main.cpp"], cwd=folder, check=True)
     done = subprocess.run(program, input=np.concatenate([a, b], 1).tobytes(), capture_output=True)
@@ -112,3 +128,9 @@ def validate(folder, text, *options):
     command = [tool("glslangValidator"), *options, "main.frag"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout
+
+
+def validate_wgsl(path):
+    """Reads and validates a file of WGSL by naga, which Firefox and wgpu have."""
+    done = subprocess.run([tool("naga"), path], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

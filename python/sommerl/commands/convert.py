@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
+from shlex import join
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..compression.compact.search import CompactOptions
 from ..compression.material import SomManBrdf
 from ..compression.paper.options import TrainOptions
-from ..formats import registry, rgl, rgl_export, smrl
+from ..formats import registry, rgl, rgl_export, smrl, source_code
 from ..formats.format import Format
 from ..formats.load import load
 from ..formats.scattered import ScatteredBrdf
@@ -22,13 +23,25 @@ from ..reflectance.reciprocal import reciprocal
 from ..reflectance.table import BrdfTable
 from ..system.errors import OptionError
 from . import answers, console
-from .arguments import Material, ReadingArguments, WritingArguments, byte_count, named_as_typed, option, positional
+from .arguments import (
+    Material,
+    ReadingArguments,
+    WritingArguments,
+    byte_count,
+    flag,
+    named_as_typed,
+    option,
+    positional,
+)
 from .checks import check_apart, check_output
 from .compress import compact_one, compress_one, fitted, trained
 from .inputs import expanded, is_several, read_all
 from .laboratory import ReportArguments, check_samples, reported, warn_of_samples
 from .parser import add_command
 from .rows import changed_rows, fact_rows
+
+# The options that what is written depends on.
+OF_CONTENT = ("columns", "max_dropped", "values", "phi_from", "target_size", "reciprocal", "noise", "no_sampler")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +64,9 @@ class ConvertArguments(ReportArguments, ReadingArguments, WritingArguments):
         default=False, help="the mean of both orders of the directions, as tables hold it in any case"
     )
     spectral: bool = option(default=False, help=".bsdf: spectra for pbrt-v4 and Mitsuba's spectral variants, not RGB")
+    no_sampler: bool = option(
+        default=False, help="source code: leave out sample and pdf, and their table of 7,680 bytes"
+    )
     noise: int | None = option(
         default=None, metavar="SEED", help="add the measurement error of MERL's data to a built-in material"
     )
@@ -137,7 +153,11 @@ def _convert_several(options: ConvertArguments, kind: Format) -> dict[str, Any]:
 
     check_apart(output, *sources)
     found = read_all(sources, options.inputs, read)
-    write([brdf for _, brdf in found], output)
+    materials = [brdf for _, brdf in found]
+    if kind is source_code.FORMAT:
+        source_code.write_several(materials, output, sampler=not options.no_sampler, command=_command(options))
+    else:
+        write(materials, output)
     size = output.stat().st_size if output.is_file() else None
     if not options.json:
         written_as = "through a pipe" if size is None else console.size(size)
@@ -162,6 +182,8 @@ def checked(options: ConvertArguments) -> Format:
     kind = registry.by_extension(registry.writable(), options.output)
     if options.spectral and kind is not rgl.FORMAT:
         raise OptionError(f"--spectral: expected an output that ends in .bsdf, found {options.output}")
+    if options.no_sampler and kind is not source_code.FORMAT:
+        raise OptionError(f"--no-sampler: expected an output of source code, found {options.output}")
     if kind and kind.names_source and options.noise is not None:
         raise OptionError("--noise: expected an output that holds the material, found a scene snippet")
     if options.reciprocal and kind and kind.names_source:
@@ -184,13 +206,29 @@ def _write(brdf: Brdf, kind: Format, options: ConvertArguments) -> Brdf:
     if options.spectral:
         rgl_export.write(brdf, options.output, spectral=True)
         return brdf
+    if kind is source_code.FORMAT:
+        compressed, sampler = _compressed(brdf, options), not options.no_sampler
+        return source_code.write(compressed, options.output, sampler=sampler, command=_command(options))
     return kind.write(_compressed(brdf, options) if kind.compressed else brdf, options.output)
+
+
+def _command(options: ConvertArguments) -> str:
+    """The command that was typed, with names of files in place of paths, which are nobody's business elsewhere."""
+    words = ["sommerl", "convert", *(Path(each).name or each for each in options.inputs), options.output.name]
+    for each in fields(options):
+        value = getattr(options, each.name)
+        if each.name in OF_CONTENT and value != each.default:
+            text = ",".join(options.columns or ()) if each.name == "columns" else str(value)
+            words += [flag(each.name)] if value is True else [flag(each.name), text]
+    return join(words)
 
 
 def _compressed(brdf: Brdf, options: ConvertArguments) -> SomManBrdf:
     """The material compressed: to the size that is asked for; else as it is, or with the defaults of `compress`."""
     if options.target_size is not None:
-        return fitted(brdf, _compact(options))[0]
+        material, report = fitted(brdf, _compact(options))
+        material.metrics.update(report.metrics)  # for the head of source code
+        return material
     return brdf if isinstance(brdf, SomManBrdf) else trained(BrdfTable.of(brdf), TrainOptions())[0]
 
 

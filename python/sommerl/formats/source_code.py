@@ -11,24 +11,26 @@ from .format import Format
 from .shader.language import LANGUAGES
 
 
-def _write(material: SomManBrdf, path: Path) -> SomManBrdf:
-    from .shader import source  # so that reading a file does not load it
+def write(material: SomManBrdf, path: Path, *, sampler: bool = True, command: str = "") -> SomManBrdf:
+    """Writes a compressed material; see `shader.source.write`, which this loads only when it is needed."""
+    from .shader import source
 
-    source.write(material, path)
+    source.write(material, path, source.Settings(sampler=sampler, command=command))
     return material
 
 
-def _write_several(materials: Sequence[Brdf], path: Path) -> None:
+def write_several(materials: Sequence[Brdf], path: Path, *, sampler: bool = True, command: str = "") -> None:
+    """Writes compact materials as one text; see `shader.source.write_atlas`."""
     from .shader import source
 
-    source.write_atlas(materials, path)
+    source.write_atlas(materials, path, source.Settings(sampler=sampler, command=command))
 
 
 FORMAT = Format(
     "source code",
     tuple(LANGUAGES),
-    "C++, GLSL or HLSL with eval, sample and pdf",
-    write=_write,
-    write_several=_write_several,
+    "C++, GLSL, HLSL, MSL or WGSL with eval, sample and pdf",
+    write=write,
+    write_several=write_several,
     compressed=True,
 )

@@ -1,1 +1,1 @@
-"""Materials as source code: C++, GLSL, HLSL."""
+"""Materials as source code: C++, GLSL, HLSL, WGSL, MSL."""
