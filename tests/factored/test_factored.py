@@ -249,7 +249,7 @@ def test_bad_factors():
 def test_without_scikit_learn(monkeypatch):
     monkeypatch.setitem(sys.modules, "sklearn.decomposition", None)
     with pytest.raises(
-        MissingDependencyError, match=r"scikit-learn is needed and not installed; install sommerl\[fit\]"
+        MissingDependencyError, match=r"scikit-learn is needed and not installed: pip install 'sommerl\[fit\]'"
     ):
         factor(GLOSSY, FEW)
     assert complaint(lambda: made().eval(A, B)) is None

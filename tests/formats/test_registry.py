@@ -26,7 +26,7 @@ DOCS = Path(__file__).parents[2] / "docs" / "formats.md"
 A, B = (w[w[:, 2] > 0.2][:40] for w in (random_directions(80, s) for s in (1, 2)))
 ANGLES = np.stack([x for w in (A, B) for x in (np.arccos(w[:, 2]), np.arctan2(w[:, 1], w[:, 0]))], axis=-1)
 WEIGHT = np.random.default_rng(0).normal(scale=0.4, size=WEIGHTS)
-HEAVY = ("scipy.spatial", "h5py")  # what the extra `formats` brings along
+HEAVY = ("scipy.spatial", "h5py")  # what the extra `lab` brings along
 
 
 def text(head, columns, separator):
@@ -154,7 +154,7 @@ def test_extensions_are_taken_in_either_case():
 def check_needs(kind, path):
     """Without the packages of extras, a file is read, or the error names the extra that is in the table."""
     said = complaint(load, path)
-    assert said is None if not kind.needs else f"install sommerl[{kind.needs}]" in str(said)
+    assert said is None if not kind.needs else f"pip install 'sommerl[{kind.needs}]'" in str(said)
 
 
 @pytest.mark.parametrize("kind", readable(), ids=lambda kind: kind.name)

@@ -168,7 +168,7 @@ def test_scipy_is_asked_for_by_a_sentence(monkeypatch):
         raise ImportError(name)
 
     monkeypatch.setattr("sommerl.system.optional.importlib.import_module", missing)
-    with pytest.raises(MissingDependencyError, match=r"install sommerl\[formats\]"):
+    with pytest.raises(MissingDependencyError, match=r"pip install 'sommerl\[lab\]'"):
         fitted_to(sampled(builtin("red-fabric")), name="x")
 
 

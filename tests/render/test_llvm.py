@@ -37,5 +37,5 @@ def test_one_chosen_by_the_user_comes_first(monkeypatch):
 
 def test_without_mitsuba_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setattr(llvm.importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(MissingDependencyError, match=r"install sommerl\[render\]"):
+    with pytest.raises(MissingDependencyError, match=r"pip install 'sommerl\[render\]'"):
         llvm._module.__wrapped__()

@@ -157,7 +157,7 @@ FORMAT = Format(
     "ALTA",
     (".dat", ".alta"),
     "samples below #DIM, #PARAM_IN and #PARAM_OUT",
-    needs="formats",
+    needs="lab",
     sniff=looks_like,
     read=parse,
     largest=LARGEST_FILE,

@@ -26,7 +26,7 @@ FORMAT = Format(
     "ASTM E1392",
     (".astm",),
     "samples below a line VARS that names their columns",
-    needs="formats",
+    needs="lab",
     sniff=looks_like,
     read=samples.parse,
     largest=LARGEST_FILE,

@@ -32,7 +32,7 @@ def looks_like(head: bytes) -> bool:
 
 
 def read(path: str | Path) -> Brdf:
-    """The material of a Cornell file. Raises FormatError if it is not one, MissingDependencyError without `formats`."""
+    """The material of a Cornell file. Raises FormatError if it is not one, MissingDependencyError without `lab`."""
     return parse(Path(path), door.read(path, LARGEST_FILE))
 
 
@@ -70,7 +70,7 @@ FORMAT = Format(
     "Cornell",
     (".brdf",),
     "scattered samples of spectra",
-    needs="formats",
+    needs="lab",
     sniff=looks_like,
     read=parse,
     largest=LARGEST_FILE,

@@ -35,7 +35,7 @@ def arrays(path: Path, data: bytes, top: str, wanted: Callable[[str], bool], mos
 
     Raises FormatError for what is damaged, larger or deeper, MissingDependencyError without h5py.
     """
-    h5py = optional("h5py", "h5py", str(path), "formats")
+    h5py = optional("h5py", "h5py", str(path), "lab")
     found: dict[str, NDArray[Any]] = {}
     try:
         with h5py.File(io.BytesIO(data), "r") as file:

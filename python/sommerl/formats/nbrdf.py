@@ -196,7 +196,7 @@ FORMAT = Format(
     "neural BRDF",
     (".h5", ".hdf5", ".keras", ".safetensors"),
     "three dense layers, as Keras or PyTorch write them",
-    needs="formats",
+    needs="lab",
     sniff=_looks_like,
     read=_weights,
     largest=LARGEST_FILE,

@@ -146,4 +146,4 @@ def drawn(samples: Samples, most: int) -> Samples:
 
 def tree(points: Floats) -> Any:
     """SciPy's tree of points. Raises MissingDependencyError without SciPy."""
-    return optional("scipy.spatial", "SciPy", "scattered samples", "formats").KDTree(points)
+    return optional("scipy.spatial", "SciPy", "scattered samples", "lab").KDTree(points)

@@ -294,7 +294,7 @@ FORMAT = Format(
     "samples",
     (".csv", ".tsv"),
     "columns theta_i_deg, phi_i_deg, theta_o_deg, phi_o_deg, r, g, b, and others of many names",
-    needs="formats",
+    needs="lab",
     sniff=looks_like,
     read=parse,
     largest=LARGEST_FILE,

@@ -153,7 +153,7 @@ def _begin(life: Connection) -> None:
 
 @contextmanager
 def _cluster(address: str, warn: Callable[[str], None]) -> Generator[Executor]:
-    distributed = optional("distributed", "Dask's distributed scheduler", "--cluster", "cluster")
+    distributed = optional("distributed", "Dask's distributed scheduler", "--cluster", "library")
     for handler in logging.getLogger("distributed").handlers:
         handler.addFilter(lambda _: False)  # what fails is told in a sentence of ours
     try:

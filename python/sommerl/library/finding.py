@@ -93,7 +93,7 @@ def colour_named(text: str, option: str = "colour") -> tuple[float, float, float
 
 
 def _css(name: str, option: str) -> str:
-    names: dict[str, str] = optional("matplotlib.colors", "matplotlib", option, "formats").CSS4_COLORS
+    names: dict[str, str] = optional("matplotlib.colors", "matplotlib", option, "lab").CSS4_COLORS
     if name not in names:
         hint = did_you_mean(name, names)
         raise OptionError(f"{option}: expected a CSS colour's name, or digits like #ffcc00, found {name}{hint}")

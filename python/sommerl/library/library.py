@@ -45,7 +45,7 @@ class Library(Mapping[str, SomManBrdf]):
     """The materials of a library, by their names: `Library("metals.smrlib")["nickel"]`.
 
     path: a folder that `sommerl library build` made, a .smrlib file, or the address of one, like https://… or s3://…,
-        which takes the packages of sommerl[remote]. Of a file, only the index is read, and then what is asked for.
+        which takes the packages of sommerl[library]. Of a file, only the index is read, and then what is asked for.
     cache: the most bytes that decoded materials may take in memory (`Brdf.bytes_memory`) to be given again without
         being read; those that were asked for last are kept.
 

@@ -12,7 +12,7 @@ from ..system.errors import FormatError, MissingDependencyError
 from ..system.optional import optional
 
 ADDRESS = re.compile(r"[a-z][a-z0-9+.-]+://", re.IGNORECASE)
-EXTRA = "remote"
+EXTRA = "library"
 
 
 def is_address(path: str) -> bool:

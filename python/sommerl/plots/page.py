@@ -34,7 +34,7 @@ MOST_MATERIALS = len(STYLES)
 
 def matplotlib(module: str = "matplotlib.figure") -> Any:
     """A module of matplotlib. Raises MissingDependencyError without it."""
-    return optional(module, "matplotlib", "plots", "formats")
+    return optional(module, "matplotlib", "plots", "lab")
 
 
 def save(figure: Any, path: Path) -> None:

@@ -12,7 +12,7 @@ from ..system.optional import optional
 @contextmanager
 def plain_style() -> Generator[None]:
     """Within the block, matplotlib uses its default settings: the same input gives the same picture for everybody."""
-    library = optional("matplotlib", "matplotlib", "plots", "formats")
+    library = optional("matplotlib", "matplotlib", "plots", "lab")
     with library.rc_context(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing")  # a name may have letters that the font lacks
         library.rcdefaults()

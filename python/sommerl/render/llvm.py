@@ -14,7 +14,7 @@ from ..system.errors import MissingDependencyError, OptionError
 from ..system.interrupt import hold_interrupts
 
 WANTED = f"a GPU, or a libLLVM {jit.OLDEST_LLVM} or newer"
-REMEDY = f"on Linux, install sommerl[render], or set {jit.PATH_VARIABLE}"
+REMEDY = f"on Linux, pip install 'sommerl[render]', or set {jit.PATH_VARIABLE}"
 USABLE = re.compile(r"(scalar|llvm|llvm_ad|cuda|cuda_ad)_(rgb|mono|spectral)(_polarized)?")
 
 
@@ -63,7 +63,7 @@ def _check(variant: str) -> None:
 @cache
 def _module() -> Any:
     if importlib.util.find_spec("mitsuba") is None:
-        raise MissingDependencyError("rendering needs Mitsuba: install sommerl[render]")
+        raise MissingDependencyError("rendering needs Mitsuba: pip install 'sommerl[render]'")
     with hold_interrupts():
         jit.choose_llvm()
         return importlib.import_module("mitsuba")

@@ -31,7 +31,7 @@ LEAST_THREADS = 2  # the caller's included; with 1, Mitsuba waits for ever when 
 def drjit() -> Any:
     """The module `drjit`. Raises MissingDependencyError if it is not installed."""
     if importlib.util.find_spec("drjit") is None:
-        raise MissingDependencyError("fitting needs Dr.Jit: install sommerl[fit]")
+        raise MissingDependencyError("fitting needs Dr.Jit: pip install 'sommerl[fit]'")
     with hold_interrupts():
         choose_llvm()
         dr = importlib.import_module("drjit")
@@ -64,8 +64,8 @@ def float64() -> Any:
     dr = drjit()
     if not has_llvm(dr):
         raise MissingDependencyError(
-            f"fitting needs libLLVM {OLDEST_LLVM} or newer, and none was found: on Linux, install sommerl[fit], or set "
-            f"{PATH_VARIABLE}"
+            f"fitting needs libLLVM {OLDEST_LLVM} or newer, and none was found: on Linux, "
+            f"pip install 'sommerl[fit]', or set {PATH_VARIABLE}"
         )
     with hold_interrupts():
         return importlib.import_module("drjit.llvm.ad").Float64

@@ -22,5 +22,5 @@ def optional(module: str, package: str, purpose: str, extra: str) -> Any:
             return importlib.import_module(module)
     except ImportError as error:
         raise MissingDependencyError(
-            f"{purpose}: {package} is needed and not installed; install sommerl[{extra}]"
+            f"{purpose}: {package} is needed and not installed: pip install 'sommerl[{extra}]'"
         ) from error

@@ -234,7 +234,7 @@ def _apart(
 def _k_means(x: Floats, weight: Floats, units: int, seed: int) -> NDArray[np.int64]:
     """As `_som`, by k-means (Lloyd, k-means++), for comparison: the node nearest to each centre."""
     drawn = np.random.default_rng(seed).choice(len(x), K_MEANS_DRAWS * len(x), p=weight / weight.sum())
-    kept = optional("scipy.cluster.vq", "SciPy", "k-means", "formats")
+    kept = optional("scipy.cluster.vq", "SciPy", "k-means", "lab")
     centres: Floats = kept.kmeans2(x[drawn], max(1, units), SOM_EPOCHS, minit="++", rng=seed)[0]
     return _nearest(centres, x).astype(np.int64)
 
