@@ -106,6 +106,15 @@ def check_mistake(samples, brdf, option, how=AS_IT_IS):
     assert any(option in sentence for sentence in checked(samples, brdf, how)["mistakes"])
 
 
+def test_no_option_is_named_that_would_do_nothing():
+    """As of files whose values mean one thing alone: the mistake is told, and no option that mends it."""
+    samples = Samples(GRID.wi, GRID.wo, 20 * GRID.f_r)
+    (said,) = checked(samples, material(samples), None)["mistakes"]
+    assert "more than there is" in said
+    assert "--" not in said
+    check_mistake(samples, material(samples), "--values")
+
+
 def material(samples, how=AS_IT_IS):
     with reading(how):
         return from_samples(samples, name="x")

@@ -32,14 +32,15 @@ STEPS = 90, 180  # in θ_o and φ, of its quadrature
 MANY = 0.5  # of the lines of incidence, so that something is said of all
 
 
-def checked(samples: Samples, brdf: Brdf, meant: Reading = AS_IT_IS) -> dict[str, Any]:
+def checked(samples: Samples, brdf: Brdf, meant: Reading | None = AS_IT_IS) -> dict[str, Any]:
     """What physics says of samples and of the material made from them.
 
     swapped_pairs: how many samples have a partner with swapped directions, within 1°; swapped_asymmetry: Σ |a − b| over
     the mean of Σ a and Σ b, of these; swapped_asymmetry_without_cosine: the same after division by the cosine of the
     viewer's angle. reflectance: the largest hemispherical reflectance of a channel for each of up to LINES θ_i,
     [[degrees, reflectance], …]. brightest: on most lines of incidence from 15° on, "specular", "retro" or "other", or
-    "" if none is oblique. mistakes: sentences, each with the option that mends it.
+    "" if none is oblique. mistakes: sentences, each with the option that mends it; without it, if `meant` is None, as
+    of files to which these options do not apply.
     """
     pairs, plain, without = _swapped(samples)
     reflectance = [[float(np.degrees(theta)), _reflectance(brdf, theta)] for theta in _lines(samples)]
@@ -54,29 +55,26 @@ def checked(samples: Samples, brdf: Brdf, meant: Reading = AS_IT_IS) -> dict[str
     return found | {"mistakes": _mistakes(found, meant)}
 
 
-def _mistakes(found: dict[str, Any], meant: Reading) -> list[str]:
-    sentences: list[str] = []
+def _mistakes(found: dict[str, Any], meant: Reading | None) -> list[str]:
+    mistakes: list[tuple[str, str]] = []  # what is seen, and what mends it
+    values, phi_from = (meant.values, meant.phi_from) if meant else ("f_r", "retro")
     plain, without = found["swapped_asymmetry"], found["swapped_asymmetry_without_cosine"]
-    if plain is not None and plain > NOTABLE and without < BETTER * plain and meant.values == "f_r":
-        sentences.append(
-            f"swapped pairs differ by {plain:.0%}, and by {without:.0%} once values are divided by cos θ_o: they seem "
-            "to be f_r times the cosine; --values f_r-cos divides by it"
-        )
+    if plain is not None and plain > NOTABLE and without < BETTER * plain and values == "f_r":
+        seen = f"swapped pairs differ by {plain:.0%}, and by {without:.0%} once values are divided by cos θ_o: "
+        mistakes.append((f"{seen}they seem to be f_r times the cosine", "; --values f_r-cos divides by it"))
     most = max((value for _, value in found["reflectance"]), default=0.0)
     if most > MOST_REFLECTED:
-        sentence = f"up to {most:.3g} times the light is reflected, which is more than there is"
-        if meant.values != "reflectance-factor" and most / np.pi <= MOST_REFLECTED:
-            sentence += ": values may be reflectance factors, π f_r; --values reflectance-factor divides by π"
-        elif meant.values != "reflectance-factor" and most / (100 * np.pi) <= MOST_REFLECTED:
-            sentence += ": values seem to be in percent; --values reflectance-factor divides by 100 π"
-        sentences.append(sentence)
-    if found["brightest"] == "retro":
-        other = "retro" if meant.phi_from == "specular" else "specular"
-        sentences.append(
-            "it is brightest where light comes from: a retro-reflector, or φ is measured from the mirror's direction; "
-            f"for that, --phi-from {other}"
-        )
-    return sentences
+        remedy = ""
+        if values != "reflectance-factor" and most / np.pi <= MOST_REFLECTED:
+            remedy = ": values may be reflectance factors, π f_r; --values reflectance-factor divides by π"
+        elif values != "reflectance-factor" and most / (100 * np.pi) <= MOST_REFLECTED:
+            remedy = ": values seem to be in percent; --values reflectance-factor divides by 100 π"
+        mistakes.append((f"up to {most:.3g} times the light is reflected, which is more than there is", remedy))
+    if found["brightest"] == "retro" and meant:
+        other = "retro" if phi_from == "specular" else "specular"
+        seen = "it is brightest where light comes from: a retro-reflector, or φ is measured from the mirror's direction"
+        mistakes.append((seen, f"; for that, --phi-from {other}"))
+    return [seen + (remedy if meant else "") for seen, remedy in mistakes]
 
 
 def _swapped(samples: Samples) -> tuple[int, float | None, float | None]:
