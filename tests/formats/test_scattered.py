@@ -24,7 +24,7 @@ def check_constant(table, value):
     wi, wo = random_directions(1000, 3), random_directions(1000, 4)
     wi, wo = (w[np.minimum(wi[:, 2], wo[:, 2]) > 0.1] for w in (wi, wo))  # where samples are
     off = np.abs(table.eval(wi, wo) / value - 1)
-    assert off.mean() < 2e-3
+    assert off.mean() < 4e-3  # a constant, times cosines and under a cube root, is no straight line between nodes
     assert np.percentile(off, 99) < 0.02
 
 

@@ -48,9 +48,9 @@ def read_npz(path: Path, data: bytes) -> dict[str, NDArray[Any]]:
         if sum(member.file_size for member in members) > LARGEST_ARRAY:
             raise FormatError(f"{path}: expected at most {MOST_ARRAYS} arrays of {LARGEST_ARRAY} bytes, found more")
         arrays: dict[str, NDArray[Any]] = {}
-        for each in members:
-            with archive.open(each) as stream:
-                arrays[each.filename.removesuffix(".npy")] = _array(path, each.filename, stream, each.file_size)
+        for member in members:
+            with archive.open(member) as stream:
+                arrays[member.filename.removesuffix(".npy")] = _array(path, member.filename, stream, member.file_size)
         return arrays
 
 
@@ -60,15 +60,15 @@ def names(path: Path, data: bytes) -> list[str]:
         return archive.namelist()
 
 
-def member(path: Path, data: bytes, name: str, most: int) -> bytes:
+def member(path: Path, data: bytes, member: str, most: int) -> bytes:
     """The bytes of one of an archive's members. Raises FormatError if there are more than `most`."""
     with _archive(path, data) as archive:
-        if archive.getinfo(name).file_size > most:
-            raise FormatError(f"{path}: {name}: expected at most {most} bytes, found more")
-        with archive.open(name) as stream:
+        if archive.getinfo(member).file_size > most:
+            raise FormatError(f"{path}: {member}: expected at most {most} bytes, found more")
+        with archive.open(member) as stream:
             found = stream.read(most + 1)
         if len(found) > most:
-            raise FormatError(f"{path}: {name}: expected at most {most} bytes, found more")
+            raise FormatError(f"{path}: {member}: expected at most {most} bytes, found more")
         return found
 
 
