@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 from helpers import must_fail, random_directions
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from kinds import KINDS
 from sampled import sampler
@@ -72,6 +72,7 @@ def test_one_rule_for_any_density(name, pairs):
 @EACH_SAMPLER
 @settings(deadline=None, max_examples=60)
 @given(PAIRS, st.integers(0, 2**32))
+@example([(0.0,) * 6, (*(0.0,) * 5, 9.2e307)], 0)  # twice its length is no number
 def test_one_rule_for_any_viewer(name, pairs, seed):
     _, wo = vectors(pairs)
     u = np.random.default_rng(seed).random(wo.shape)

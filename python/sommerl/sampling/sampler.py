@@ -95,8 +95,9 @@ def sampled(
     numbers = np.where(known[..., None], numbers, 0.5)
     with np.errstate(all="ignore"):
         wi, density = draw(split(viewer), split(numbers))
-        drawn = above & (density > 0)
-        light = np.where(drawn[..., None], np.stack(wi, axis=-1), UP)
+        towards = np.stack(wi, axis=-1)
+        drawn = above & (density > 0) & np.isfinite(towards).all(axis=-1)  # which overflow may have undone
+        light = np.where(drawn[..., None], towards, UP)
         pdf = finite(np.where(drawn, density, 0.0))
         share = np.where(drawn, light[..., 2] / np.where(drawn, pdf, 1.0), 0.0)
         weight = finite(f_r(light, viewer) * share[..., None])
