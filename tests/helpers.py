@@ -3,6 +3,8 @@
 import json
 import os
 import shutil
+import signal
+import subprocess
 from collections.abc import Callable
 from contextlib import contextmanager
 from typing import Any
@@ -40,6 +42,19 @@ def complaint(call: Callable[..., Any], *arguments: Any) -> str | None:
 def check_sentence(message: str | None, name: str) -> None:
     """One line that names the file, if there is anything to say."""
     assert message is None or ("\n" not in message and f"{name}" in message)
+
+
+def launch(command: list[str], action: Any = signal.SIG_DFL, **options: Any) -> subprocess.Popen[str]:
+    """A program that is at work, with pipes for what it says. action: what it does when it is interrupted."""
+    return subprocess.Popen(
+        command,
+        **options,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # Where tests run in the background, the signal is ignored, and programs that they start would ignore it, too.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, action),
+    )
 
 
 def tool(name: str) -> str:

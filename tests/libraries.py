@@ -2,13 +2,11 @@
 
 import hashlib
 import os
-import signal
-import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from helpers import SMALL
+from helpers import SMALL, launch
 
 import sommerl
 from sommerl import TrainOptions
@@ -59,16 +57,7 @@ def names(records):
 
 def started(*arguments, program=("-m", "sommerl")):
     """A process of the command line, with a group of its own."""
-    command = [sys.executable, *program, *map(str, arguments)]
-    return subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        # Where tests run in the background, the signal is ignored, and programs that they start would ignore it, too.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
+    return launch([sys.executable, *program, *map(str, arguments)], start_new_session=True)
 
 
 def alive(pid):

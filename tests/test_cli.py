@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from helpers import PATIENCE, must_fail, run, run_json
+from helpers import PATIENCE, launch, must_fail, run, run_json
 
 import sommerl
 from sommerl import NAMES, BrdfTable, Lattice, load
@@ -374,15 +374,7 @@ def test_a_folder_does_not_hide_a_builtin(capsys, tmp_path, monkeypatch):
 
 
 def start(*arguments, **options):
-    return subprocess.Popen(
-        [sys.executable, "-m", "sommerl", *map(str, arguments)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        # Where tests run in the background, the signal is ignored, and programs that they start would ignore it, too.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-        **options,
-    )
+    return launch([sys.executable, "-m", "sommerl", *map(str, arguments)], **options)
 
 
 def test_interrupting_leaves_no_file(tmp_path):

@@ -6,7 +6,7 @@ import sys
 import time
 
 import pytest
-from helpers import PATIENCE, interrupting, run, run_json
+from helpers import PATIENCE, interrupting, launch, run, run_json
 
 from sommerl.commands import console
 from sommerl.render import checkpoint, passes
@@ -37,14 +37,7 @@ llvm.jit.has_llvm = lambda dr: False
 
 def start(*arguments, before=""):
     """The command, which writes its checkpoint after each of many short passes."""
-    return subprocess.Popen(
-        [sys.executable, "-c", before + EAGER, *map(str, arguments)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        # Where tests run in the background, the signal is ignored, and programs that they start would ignore it, too.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
+    return launch([sys.executable, "-c", before + EAGER, *map(str, arguments)])
 
 
 OWN = """<scene version="3.0.0">

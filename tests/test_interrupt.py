@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers import PATIENCE, must_fail
+from helpers import PATIENCE, launch, must_fail
 
 from sommerl import builtin
 from sommerl.system.interrupt import hold_interrupts
@@ -34,18 +34,6 @@ sys.exit(status)
 def start(body, after="", **options):
     """The command line, with a command of the test's own; it prints a line when it is at work."""
     return launch([sys.executable, "-c", PROGRAM.format(body=body, after=after)], **options)
-
-
-def launch(command, action=signal.SIG_DFL, **options):
-    return subprocess.Popen(
-        command,
-        **options,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        # Where tests run in the background, the signal is ignored, and programs that they start would ignore it, too.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, action),
-    )
 
 
 def ended(process, *signals, pause=0.0):

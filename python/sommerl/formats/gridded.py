@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..reflectance.grid import GridBrdf
 from ..reflectance.half_diff import TWO_PI
-from ..reflectance.samples import Samples
+from ..reflectance.samples import Samples, polar_angles
 from ..system.errors import FormatError, MaterialError
 
 STEP = 1e-4  # [rad] angles that agree to that are one
@@ -73,7 +73,7 @@ def grid_of(
 
 def angles_of(samples: Samples) -> tuple[Floats, Floats, Floats]:
     """θ_i, θ_o, and Δφ from light to viewer, from 0 to 2π [rad]."""
-    theta_i, theta_o = (np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2]) for w in (samples.wi, samples.wo))
+    (theta_i, _), (theta_o, _) = map(polar_angles, (samples.wi, samples.wo))
     (x, y), (u, v) = samples.wi[:, :2].T, samples.wo[:, :2].T
     phi = np.arctan2(x * v - y * u, x * u + y * v)
     phi[phi < -STEP / 2] += TWO_PI

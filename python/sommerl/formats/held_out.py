@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..reflectance.distance import LOG_FLOOR
-from ..reflectance.samples import Samples
+from ..reflectance.samples import Samples, polar_angles
 from .regression import CHARTS, NEIGHBOURS, Chart, Regression, drawn
 
 HELD_OUT = 10  # one sample in so many tests the others
@@ -38,7 +38,7 @@ def points(samples: Samples) -> Masks:
 def lines(samples: Samples) -> Masks:
     """Which samples are on every third line of incidence that lies between two others, (n); none if there are fewer
     than three lines."""
-    theta_i = np.arctan2(np.hypot(samples.wi[:, 0], samples.wi[:, 1]), samples.wi[:, 2])
+    theta_i, _ = polar_angles(samples.wi)
     line = np.rint(theta_i / LINE).astype(np.int64)
     known, count = np.unique(line, return_counts=True)
     many = count >= LEAST_OF_LINE

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..reflectance.brdf import Brdf
-from ..reflectance.samples import Samples
+from ..reflectance.samples import Samples, polar_angles
 from ..system.files import atomic_write
 from .compared import relative_errors
 
@@ -21,11 +21,7 @@ COLUMNS = (
 def write(samples: Samples, brdf: Brdf, path: Path) -> None:
     """Writes a line for each sample, in the order in which they are in the file they are from, repeated ones once: its
     directions, its value, that of the material, and the relative error (`compared.relative_errors`)."""
-    angles = [
-        np.degrees(angle)
-        for w in (samples.wi, samples.wo)
-        for angle in (np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2]), np.arctan2(w[:, 1], w[:, 0]))
-    ]
+    angles = [np.degrees(angle) for w in (samples.wi, samples.wo) for angle in polar_angles(w)]
     found = brdf.eval(samples.wi, samples.wo)
     table = np.column_stack([*angles, samples.f_r, found, relative_errors(samples, brdf)])
     with atomic_write(path) as out:

@@ -31,3 +31,9 @@ class Samples:
     def some(self, which: NDArray[Any] | slice) -> Samples:
         """Those of a mask, of a slice, or with the given numbers."""
         return Samples(self.wi[which], self.wo[which], self.f_r[which])
+
+
+def polar_angles(directions: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """θ and φ [rad] of directions (n, 3), as `Samples.at_angles` takes them. φ is from −π to π."""
+    x, y, z = directions.T
+    return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
