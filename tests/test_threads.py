@@ -12,8 +12,8 @@ from sommerl.system import threads
 from sommerl.system.errors import OptionError
 
 # Runs some work, and meanwhile looks how many threads run or wait for a processor at the same time, other than the one
-# that looks: so many or fewer in 19 of 20 looks. (The libraries' pools are apart, and wait for each other: one worker each
-# of Dr.Jit and of OpenBLAS may work in turn. OpenBLAS is told not to spin when its work is done.)
+# that looks: so many or fewer in 19 of 20 looks. (The libraries' pools are apart, and wait for each other: one worker
+# each of Dr.Jit and of OpenBLAS may work in turn. OpenBLAS is told not to spin when its work is done.)
 WATCHED = """
 import json, os, sys, threading
 def runnable():
