@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from functools import cache
 from importlib import resources
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,13 +116,14 @@ class Prior:
         Neither direction is beyond STEEPEST, nor are they nearer to each other than NEAREST.
         """
         _, vectors = np.linalg.eigh(self._brightness @ self._brightness.T)
-        rows: Singles = vectors[:, ::-1][:, :DIRECTIONS].T @ self._brightness
+        rows = (vectors[:, ::-1][:, :DIRECTIONS].T @ self._brightness).astype(np.float32)
         weight = (LATTICE.solid_angles()[LATTICE.above_horizon] * self._cosines).astype(np.float32)
         wi, wo = directions(*self._place)
         theta = np.maximum(*(polar_angles(np.stack(w, axis=-1))[0] for w in (wi, wo)))
         able = (theta <= STEEPEST) & (2 * self._place[1] >= NEAREST)
         wanted = (rows * (weight / weight.sum())) @ rows.T
-        left, variance = rows.copy(), (rows**2).sum(axis=0)
+        left: Any = rows.copy()
+        variance: Any = (rows**2).sum(axis=0)
         own = (UNSEEN**2 * (self._brightness**2).sum(axis=0) + NOISE**2).astype(np.float32)
         chosen: list[int] = []
         for _ in range(count):
@@ -153,7 +155,7 @@ class Prior:
         covariance = at.T @ at + np.outer(size, size) * _alike(places, places) + NOISE**2 * np.eye(len(size))
         factor = np.linalg.cholesky(covariance)
         weights = np.linalg.solve(covariance, measured)
-        found: Floats = (at @ weights).T.astype(np.float32) @ rows
+        found = ((at @ weights).T.astype(np.float32) @ rows).astype(np.float64)
         sizes = np.sqrt((rows**2).sum(axis=0)) * UNSEEN
         for start in range(0, len(sizes), AT_ONCE):
             part = slice(start, start + AT_ONCE)
