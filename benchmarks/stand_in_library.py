@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from sommerl import Lattice, SomManBrdf, save
 
 LATTICE = Lattice(90, 24, 36)
+NP = Path(__file__).resolve().parents[2] / "shared" / "data" / "np"
 SCALE = 0.15  # of what the network gives, before its four logarithms are undone
 LOGARITHMS, LARGEST_EXPONENT = 4, 20.0
 LATENT = 7  # numbers of a material
@@ -41,16 +42,14 @@ def main() -> int:
     parser.add_argument("out", type=Path)
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--data", type=Path, default=Path(__file__).resolve().parents[2] / "shared" / "data" / "np")
+    parser.add_argument("--data", type=Path, default=NP)
     parser.add_argument("--bases", help="names of stand-ins, between commas (all)")
     options = parser.parse_args()
-    names = sorted(path.name.removesuffix("_latentVector.npy") for path in (options.data / "latent").glob("*.npy"))
-    if options.bases:
-        names = [name for name in names if name in options.bases.split(",")]
-    bases = _decoded(options.data, names, options.out.with_name(f"{options.out.name}.bases.npz"))
+    cache = options.out.with_name(f"{options.out.name}.bases.npz")
+    found = bases(options.data, cache, options.bases.split(",") if options.bases else None)
     for number in range(options.count):
         rng = np.random.Generator(np.random.PCG64([options.seed, number]))
-        name, values = _made(rng, bases)
+        name, values = _made(rng, found)
         path = options.out / name / f"{number:04}.smrl"
         if not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -93,8 +92,10 @@ def _theta_h(place: float) -> NDArray[np.float64]:
     return ((np.arange(count) + place) / count) ** 2 * np.pi / 2
 
 
-def _decoded(data: Path, names: list[str], cache: Path) -> dict[str, Values]:
-    """The stand-ins' values above the horizon, (cells, 3) each."""
+def bases(data: Path, cache: Path, some: list[str] | None = None) -> dict[str, Values]:
+    """The stand-ins' values above the horizon, (cells, 3) each: of all, or of those with some names."""
+    names = sorted(path.name.removesuffix("_latentVector.npy") for path in (data / "latent").glob("*.npy"))
+    names = [name for name in names if some is None or name in some]
     if cache.exists():
         with np.load(cache) as held:
             if list(held) == names:

@@ -14,6 +14,7 @@ from dataclasses import MISSING, Field, dataclass, field, fields
 from fractions import Fraction
 from typing import Any, Literal, NewType, TypeVar, get_args, get_origin, get_type_hints
 
+from ..formats.prior import FEWEST, MOST
 from ..formats.reading import MOST_DROPPED, PhiFrom, Values
 from ..system import threads
 from ..system.errors import OptionError
@@ -93,6 +94,10 @@ class ReadingArguments(Arguments):
         default="retro",
         help="of tables of samples: where the viewer's azimuth is 0: on the side of the light, or of the mirror's "
         "direction (%(default)s)",
+    )
+    prior: bool = option(
+        default=False,
+        help=f"of tables of {FEWEST} to {MOST} samples: estimate what was not measured from 99 known materials",
     )
 
 

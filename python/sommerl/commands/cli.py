@@ -28,6 +28,7 @@ from . import (
     info,
     library,
     paper,
+    plan,
     plot,
     render,
     view,
@@ -65,6 +66,7 @@ COMMANDS = (
     info,
     convert,
     eval,
+    plan,
     blend,
     compare,
     fit,
@@ -119,7 +121,7 @@ def _reading(options: Any) -> Reading:
     if not isinstance(options, ReadingArguments):
         return Reading()
     with named_as_typed():
-        return Reading(options.columns or (), options.max_dropped, options.values, options.phi_from)
+        return Reading(options.columns or (), options.max_dropped, options.values, options.phi_from, options.prior)
 
 
 def _warned(message: Warning | str, *_: Any, **__: Any) -> None:

@@ -41,7 +41,17 @@ from .parser import add_command
 from .rows import changed_rows, fact_rows
 
 # The options that what is written depends on.
-OF_CONTENT = ("columns", "max_dropped", "values", "phi_from", "target_size", "reciprocal", "noise", "no_sampler")
+OF_CONTENT = (
+    "columns",
+    "max_dropped",
+    "values",
+    "phi_from",
+    "prior",
+    "target_size",
+    "reciprocal",
+    "noise",
+    "no_sampler",
+)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -44,7 +44,12 @@ def check_samples(options: ReportArguments, brdf: Brdf, source: str) -> None:
 def warn_of_samples(brdf: Brdf, source: str) -> None:
     """Warns of what is extrapolated."""
     share = extrapolated(brdf)
-    if share is not None and share > NOTABLE:
+    if "prior" in brdf.facts:
+        console.warn(
+            f"{source}: what was not measured is estimated from {brdf.facts['prior']} (--prior); the median of the "
+            f"standard deviation of log f_r is {brdf.facts['deviation_median']:.2g}"
+        )
+    elif share is not None and share > NOTABLE:
         console.warn(
             f"{source}: {share:.0%} of all pairs of directions above the horizon, by solid angles and cosines, are "
             f"more than {REACH_DEGREES:.0f}° from every sample: there, this material is extrapolated"

@@ -69,6 +69,9 @@ FACTS = {
     "held_out_median_relative_error": "every tenth sample held out: median relative error",
     "held_out_lines_log_error_cosine": "lines of incidence held out: RMS error of the logarithm, cosine-weighted",
     "held_out_lines_median_relative_error": "lines of incidence held out: median relative error",
+    "prior": "what was not measured is estimated (--prior) from",
+    "deviation_median": "standard deviation of log f_r there, median",
+    "deviation": "standard deviation of log f_r, for bands of θ_h and θ_d (--json has them)",
     "grid_points_missing": "points of the grid that were not measured, interpolated",
 }
 
@@ -76,7 +79,13 @@ FACTS = {
 def fact_rows(facts: Mapping[str, Any]) -> dict[str, str]:
     """What a reader reports, for people."""
     rows = {FACTS.get(name, name): value for name, value in facts.items()}
-    return {name: f"{value:.3g}" if isinstance(value, float) else str(value) for name, value in rows.items()}
+    return {name: _fact(value) for name, value in rows.items()}
+
+
+def _fact(value: Any) -> str:
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        return f"{len(value)} × {len(value[0])}"  # pyright: ignore[reportUnknownArgumentType]
+    return f"{value:.3g}" if isinstance(value, float) else str(value)  # pyright: ignore[reportUnknownArgumentType]
 
 
 def lobe_text(lobe: Mapping[str, Any]) -> str:

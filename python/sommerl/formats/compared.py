@@ -17,8 +17,7 @@ from ..reflectance.samples import Samples
 from ..system.errors import FormatError, MaterialError
 from . import held_out
 from .gridded import grid_of
-from .regression import NEIGHBOURS
-from .scattered import ScatteredBrdf, fitted_to, near
+from .scattered import ScatteredBrdf, fewest, fitted_to, near
 
 Floats = NDArray[np.float64]
 Figures = dict[str, float]
@@ -80,11 +79,12 @@ def compared(source: Brdf, written: Brdf, made: Callable[[Brdf], Brdf]) -> dict[
     lines = held_out.lines(samples)
     points = np.zeros(len(lines), bool) if gridded else held_out.points(samples) & ~lines
     kept = samples.some(~(lines | points))
-    if not (lines | points).any() or len(kept.wi) < 2 * NEIGHBOURS:
+    prior = isinstance(source, ScatteredBrdf) and source.estimate is not None
+    if not (lines | points).any() or len(kept.wi) < fewest(prior):
         return report
     try:
         if isinstance(source, ScatteredBrdf):
-            again = made(fitted_to(kept, name=source.name, choice=source.choice))
+            again = made(fitted_to(kept, name=source.name, choice=source.choice, prior=prior))
         else:
             without = grid_of(kept, name=source.name)
             if without is None:

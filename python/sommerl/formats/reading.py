@@ -22,7 +22,8 @@ class Reading:
     max_dropped: the largest share of the rows that may be left out, since they hold no numbers or lie below the
     horizon. values: what these are: f_r [1/sr]; f_r-cos, f_r times the cosine of the viewer's angle; or
     reflectance-factor, π f_r, also in percent, which its size tells. phi_from: where the viewer's azimuth is 0: on the
-    side of the light (retro), or of the mirror's direction (specular).
+    side of the light (retro), or of the mirror's direction (specular). prior: whether what was not measured is
+    estimated from what is known of other materials (`prior`), for few samples.
 
     Raises OptionError for a share that is none.
     """
@@ -31,6 +32,7 @@ class Reading:
     max_dropped: float = MOST_DROPPED
     values: Values = "f_r"
     phi_from: PhiFrom = "retro"
+    prior: bool = False
 
     def __post_init__(self) -> None:
         if not 0 <= self.max_dropped <= 1:

@@ -51,3 +51,10 @@ def write_grid(brdf: Brdf, path: Path) -> Brdf:
     """Writes a BRDF at the directions of a grid, and returns it."""
     write(at_directions(brdf, grid_of(brdf)), path)
     return brdf
+
+
+def write_plan(angles: Values, path: Path) -> None:
+    """Writes θ_i, φ_i, θ_o, φ_o [rad], (n, 4), as text in degrees, with columns for values that are empty."""
+    with atomic_write(path) as out:
+        out.write(MARK + HEADER)
+        np.savetxt(out, np.degrees(angles), "%.4f", ",", newline=",,,\n")

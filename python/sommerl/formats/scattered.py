@@ -32,6 +32,7 @@ from ..system.threads import limit
 from .gridded import grid_of
 from .held_out import Choice, chosen
 from .meant import as_f_r
+from .prior import DEVIATIONS, FEWEST, MOST, Estimate, shipped
 from .reading import asked
 from .regression import NEIGHBOURS, Regression, tree
 
@@ -46,15 +47,19 @@ NODES_A_SAMPLE, FEWEST_NODES, MOST_NODES = 20, 15_000, 60_000  # of the lattice
 SAME = 1e-4  # samples whose coordinates agree to that are one, measured several times
 IN_PLANE = np.radians(0.5)  # azimuths between 0 and this, or this and π, lie on neither side of the plane of incidence
 MOST_SAMPLES = 2_000_000
+PRIOR = "99 NP stand-ins of MERL's materials"
+BANDS = 10, 6  # of θ_h and θ_d, for which facts tell the deviations
 
 
 class ScatteredBrdf(FittedTable):
     """A material that was fitted to samples. samples: these, at different directions. measured: whether one lies near
-    each cell of COVERAGE, of its shape. choice: how samples were interpolated."""
+    each cell of COVERAGE, of its shape. choice: how samples were interpolated. estimate: in place of that, what a prior
+    made of them."""
 
     kind = "measurement"
     measured: NDArray[np.bool_]
-    choice: Choice
+    choice: Choice | None = None
+    estimate: Estimate | None = None
 
     def __init__(self, fitted: FittedTable, samples: Samples, facts: Mapping[str, Any], source: Source) -> None:
         super().__init__(fitted.lattice, fitted.node_values, fitted.scale, signed=fitted.signed, name=fitted.name)
@@ -99,13 +104,16 @@ def from_samples(
     (`gridded.grid_of`), or one that is fitted to them (`fitted_to`). Those at the horizon itself, where nothing can be
     measured, are left out. facts: what the file's reader reports.
 
-    Raises FormatError for samples below the horizon or fewer than 2·NEIGHBOURS, and MissingDependencyError without
-    SciPy if they are on no grid.
+    Where `reading.asked` says so, the material is that of the prior and of the samples, whether on a grid or not.
+    Raises FormatError for samples below the horizon, fewer than `fewest` or too many, and MissingDependencyError
+    without SciPy if they are on no grid.
     """
-    _check(samples)
+    _check(samples, asked().prior)
     samples = as_f_r(samples, asked())
     above = np.minimum(samples.wi[:, 2], samples.wo[:, 2]) > HORIZON
     kept = samples if above.all() else samples.some(above)
+    if asked().prior:
+        return fitted_to(samples, name=name, source_sha256=source_sha256, facts=facts, prior=True)
     grid = grid_of(kept, name=name, source_sha256=source_sha256, facts=facts)
     if grid and np.median(np.diff(grid.axes[0])) <= COARSEST:
         return grid
@@ -119,9 +127,11 @@ def fitted_to(
     source_sha256: str = "",
     facts: Mapping[str, Any] = MappingProxyType({}),
     choice: Choice | None = None,
+    prior: bool = False,
 ) -> ScatteredBrdf:
     """The material that is fitted to samples, whether they are on a grid or not. facts: what the file's reader reports.
-    choice: how samples are interpolated, if that is known already.
+    choice: how samples are interpolated, if that is known already. prior: whether what was not measured is estimated
+    from other materials (`prior`), in place of that.
 
     It keeps negative values where samples have some.
 
@@ -129,23 +139,31 @@ def fitted_to(
     those left out; samples_negative, those with a channel below 0; mirrored, whether they lay on one side of the plane
     of incidence, and stand for the other, too; coverage, the share of all pairs of directions, by solid angles and
     cosines, that is within REACH of a sample; one_sided, whether both orders of the directions are kept apart; and what
-    `held_out.chosen` reports.
+    `held_out.chosen` reports. With a prior, in place of the last two: prior, which one; deviation_median, by solid
+    angles and cosines, and deviation, means for bands of θ_h (rows, equal in √θ_h) and of θ_d: of the standard
+    deviation of log f_r, all of which `estimate` holds.
 
     Raises FormatError and MissingDependencyError as `from_samples`.
     """
-    _check(samples)
+    _check(samples, prior)
     above = np.minimum(samples.wi[:, 2], samples.wo[:, 2]) > HORIZON
     negative = int((samples.f_r[above] < 0).any(axis=1).sum())
     kept = merged(samples.some(above))
-    if len(kept.wi) < 2 * NEIGHBOURS:
-        raise FormatError(f"expected samples at {2 * NEIGHBOURS} different directions, found {len(kept.wi)}")
+    if len(kept.wi) < fewest(prior):
+        raise FormatError(f"expected samples at {fewest(prior)} different directions, found {len(kept.wi)}")
     if not (kept.f_r > 0).any():
         raise FormatError("expected a positive reflectance in some sample, found none")
     both, mirrored = both_sides(kept)
-    choice = choice or chosen(kept, both_sides)
-    found = Regression(both, choice.chart, one_sided=choice.one_sided, mirrored=mirrored, name=name)
+    estimate = shipped().estimate(kept, name=name) if prior else None
+    if estimate is not None:
+        found, report, mirrored, nodes = estimate, _uncertainty(estimate), False, MOST_NODES
+    else:
+        choice = choice or chosen(kept, both_sides)
+        found = Regression(both, choice.chart, one_sided=choice.one_sided, mirrored=mirrored, name=name)
+        report = {"one_sided": choice.one_sided, **choice.report}
+        nodes = int(np.clip(NODES_A_SAMPLE * len(kept.wi), FEWEST_NODES, MOST_NODES))
     try:
-        fitted = fitted_to_samples(found, int(np.clip(NODES_A_SAMPLE * len(kept.wi), FEWEST_NODES, MOST_NODES)))
+        fitted = fitted_to_samples(found, nodes)
     except MaterialError as error:
         raise FormatError(str(error)) from error
     measured = near(both, *directions(*(angle[COVERAGE.above_horizon] for angle in COVERAGE.angles())))
@@ -157,21 +175,47 @@ def fitted_to(
         "samples_negative": negative,
         "mirrored": mirrored,
         "coverage": float((weight * measured).sum() / weight.sum()),
-        "one_sided": choice.one_sided,
-        **choice.report,
+        **report,
         **facts,
     }
     brdf = ScatteredBrdf(fitted, kept, found_facts, Source(source_sha256))
-    brdf.choice = choice
+    brdf.choice, brdf.estimate = choice, estimate
     brdf.measured = np.zeros(COVERAGE.shape, bool)
     brdf.measured[COVERAGE.above_horizon] = measured
     return brdf
 
 
-def _check(samples: Samples) -> None:
+def fewest(prior: bool) -> int:
+    """The number of samples, at different directions, that a material can be made of."""
+    return FEWEST if prior else 2 * NEIGHBOURS
+
+
+def _uncertainty(estimate: Estimate) -> dict[str, Any]:
+    """What the facts of a material tell of an estimate."""
+    above, deviation = DEVIATIONS.above_horizon, estimate.deviation
+    weight = DEVIATIONS.solid_angles() * np.prod(DEVIATIONS.cosines(), axis=0) * above
+    order = np.argsort(deviation[above])
+    sums = np.cumsum(weight[above][order])
+    bands = (BANDS[0], DEVIATIONS.shape[0] // BANDS[0], BANDS[1], DEVIATIONS.shape[1] // BANDS[1], -1)
+    totals, counts = (
+        each.reshape(bands).sum(axis=(1, 3, 4)) for each in (np.where(above, deviation, 0.0), above.astype(float))
+    )
+    means = np.where(counts > 0, totals / np.maximum(counts, 1), 0.0)
+    return {
+        "prior": PRIOR,
+        "deviation_median": float(deviation[above][order][np.searchsorted(sums, sums[-1] / 2)]),
+        "deviation": np.round(means, 3).tolist(),
+    }
+
+
+def _check(samples: Samples, prior: bool) -> None:
     """Raises FormatError for what no material can be fitted to."""
-    if not 2 * NEIGHBOURS <= len(samples.wi) <= MOST_SAMPLES:
-        raise FormatError(f"expected {2 * NEIGHBOURS} to {MOST_SAMPLES} samples, found {len(samples.wi)}")
+    most = MOST if prior else MOST_SAMPLES
+    if not fewest(prior) <= len(samples.wi) <= most:
+        count = len(samples.wi)
+        other = f" (--prior estimates a material of {FEWEST} to {MOST})" if FEWEST <= count < fewest(prior) else ""
+        with_prior = " with --prior" if prior else ""
+        raise FormatError(f"expected {fewest(prior)} to {most} samples{with_prior}, found {count}{other}")
     if not (np.isfinite(samples.f_r).all() and np.isfinite(samples.wi).all() and np.isfinite(samples.wo).all()):
         raise FormatError("expected finite numbers in every sample, found NaN or infinity")
     if np.abs(samples.f_r).max() > LARGEST:  # and not set to 0, as in tables: its neighbours would be lost with it

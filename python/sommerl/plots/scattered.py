@@ -9,6 +9,7 @@ import numpy as np
 
 from ..formats.compared import relative_errors
 from ..formats.gridded import angles_of
+from ..formats.prior import Estimate
 from ..formats.scattered import COVERAGE, REACH, ScatteredBrdf
 from ..reflectance.arrays import split
 from ..reflectance.brdf import Brdf
@@ -44,14 +45,15 @@ def coverage(brdf: ScatteredBrdf, path: Path, written: Brdf | None = None) -> No
             _hemisphere(figure.add_subplot(2, 4, k + 2, projection="polar"), brdf, incidence)
         _residuals(figure.add_subplot(2, 4, 5), brdf.samples, shown)
         for k, angle in enumerate(_incidences(brdf.samples)):
-            cut(figure.add_subplot(2, 4, k + 6, projection="polar"), brdf.samples, shown, angle)
+            ax = figure.add_subplot(2, 4, k + 6, projection="polar")
+            cut(ax, brdf.samples, shown, angle, brdf.estimate)
         save(figure, path)
 
 
-def cut(ax: Any, samples: Samples, brdf: Brdf, theta_i: float) -> None:
+def cut(ax: Any, samples: Samples, brdf: Brdf, theta_i: float, estimate: Estimate | None = None) -> None:
     """Draws a cut in the plane of incidence at θ_i [rad] into polar axes: f_r, the mean of the channels, of samples
     within IN_CUT of it as dots, and of a material as a curve. θ_o is negative on the side of the light; the radius is
-    logarithmic."""
+    logarithmic. Of an estimate, a band is two standard deviations wide, one to each side of the curve."""
     angle_i, angle_o, phi = angles_of(samples)
     aside = np.sin(angle_o) * np.abs(np.sin(phi))
     those = (np.abs(angle_i - theta_i) < IN_CUT) & (aside < np.sin(IN_CUT))
@@ -66,6 +68,10 @@ def cut(ax: Any, samples: Samples, brdf: Brdf, theta_i: float) -> None:
     ax.set_theta_direction(-1)
     ax.set_rscale("log")
     ax.plot(theta, np.maximum(curve, floor), linewidth=1.0)
+    if estimate is not None:
+        factor = np.exp(estimate.deviation_at(np.broadcast_to(wi, wo.shape), wo))
+        band = (np.clip(each, floor, top) for each in (curve / factor, curve * factor))
+        ax.fill_between(theta, *band, alpha=0.25, linewidth=0)
     ax.plot(signed, np.maximum(dots, floor), ".", color="black", markersize=2.5)
     ax.plot([-theta_i, -theta_i], [floor, top], ":", color="grey", linewidth=0.8)
     ax.set(thetamin=-90, thetamax=90, title=f"θ_i = {np.degrees(theta_i):.3g}°, {int(those.sum())} samples")
