@@ -24,7 +24,18 @@ U = np.random.default_rng(4).random((COUNT, 3))
 @cache
 def example(name):
     """A program of rust/reader/examples, which notices overflows."""
-    build = [tool("cargo"), "build", "--quiet", "--locked", "--profile", "test", "--package", "sommerl", "--example", name]
+    build = [
+        tool("cargo"),
+        "build",
+        "--quiet",
+        "--locked",
+        "--profile",
+        "test",
+        "--package",
+        "sommerl",
+        "--example",
+        name,
+    ]
     done = subprocess.run(build, cwd=ROOT / "rust", capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return ROOT / "rust" / "target" / "debug" / "examples" / name
