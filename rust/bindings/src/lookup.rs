@@ -9,7 +9,7 @@ use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use sommerl_codec::NodeLattice;
-use sommerl_kernels::{CellLattice, CellMaterial, Cells, Factors, Material, NodeMaterial, NodeSteps, eval};
+use sommerl_kernels::{CellLattice, CellMaterial, Cells, Cubes, Factors, Material, NodeMaterial, NodeSteps, eval};
 
 use crate::convert::{instruction_set, invalid, line, rows};
 use crate::guarded;
@@ -155,7 +155,8 @@ impl NodeLookup {
             self.with_factors(py, |factors| {
                 let NodeLookup { steps, scale, signed, smooth, .. } = self;
                 let count = pairs.wi.len();
-                let material = py.detach(|| NodeMaterial::new(steps, factors, *scale, *signed, *smooth, count));
+                let material =
+                    py.detach(|| NodeMaterial::new(steps, factors, Cubes::new(*scale, *signed, *smooth), count));
                 pairs.evaluated(py, &material, simd, threads)
             })
         })

@@ -34,6 +34,25 @@ impl Palette {
         if ordered && gains && shapes { Ok(()) } else { Err(Error::PaletteCodes) }
     }
 
+    /// What the codes of gains stand for.
+    pub fn gain_values(&self) -> Vec<f64> {
+        let value = |code: &i32| {
+            let (octave, place) = (code.abs() / OCTAVE as i32, code.abs() % OCTAVE as i32);
+            let gain = 0.5 * (f64::from(1_u32 << octave) * (1.0 + f64::from(place) / OCTAVE) - 1.0);
+            if *code < 0 { -gain } else { gain }
+        };
+        self.gains.iter().map(value).collect()
+    }
+
+    /// What the codes of shapes stand for: red, green and blue, whose mean is 1.
+    pub fn shape_values(&self) -> Vec<[f64; 3]> {
+        let value = |code: &[i32; 2]| {
+            let (red_blue, green) = (f64::from(code[0]) / UNIT, 1.0 + f64::from(code[1]) / UNIT * 2.0 / 3.0);
+            [(3.0 - green + red_blue) / 2.0, green, (3.0 - green - red_blue) / 2.0]
+        };
+        self.shapes.iter().map(value).collect()
+    }
+
     /// What the model sees of the entries: the octave of each gain, and the first and the second coordinate of each shape.
     pub(crate) fn places(&self) -> [Vec<f64>; 3] {
         let gains = self.gains.iter().map(|&code| f64::from(code) / OCTAVE).collect();

@@ -4,7 +4,7 @@
 use std::hint::black_box;
 
 use sommerl_codec::{CompactMaterial, InstructionSet, Layout, NodeLattice, Palette, decode, encode};
-use sommerl_kernels::{Epoch, Factors, Learner, NodeMaterial, NodeSteps, eval};
+use sommerl_kernels::{Cubes, Epoch, Factors, Learner, NodeMaterial, NodeSteps, eval};
 
 const SET: InstructionSet = InstructionSet::PORTABLE;
 
@@ -66,7 +66,7 @@ fn lookup() {
     let factors = Factors { gains: &gains, shapes: &shapes, gain: &gain, shape: &shape };
     let (wi, wo) = (directions(50_000, 5), directions(50_000, 6));
     let mut found = vec![[0.0; 3]; wi.len()];
-    eval(&wi, &wo, &NodeMaterial::new(&steps, factors, 1.0, true, true, wi.len()), SET, 1, &mut found);
+    eval(&wi, &wo, &NodeMaterial::new(&steps, factors, Cubes::new(1.0, true, true), wi.len()), SET, 1, &mut found);
     black_box(found);
 }
 

@@ -1,6 +1,6 @@
 //! Lookup in a material on cells: the same formulas, in the same order, as `reflectance/cells.py`.
 
-use crate::lookup::{BATCH, Material, Pairs, Room};
+use crate::lookup::{BATCH, Material, Pairs, Room, half_diff};
 
 /// A material on cells.
 pub struct CellMaterial<'a> {
@@ -66,6 +66,26 @@ impl Material for CellMaterial<'_> {
                 fill(pairs, self.lattice, room, out, |cell| triple(lut, index[cell] as usize))
             }
         }
+    }
+}
+
+impl CellMaterial<'_> {
+    /// f_r of one pair, whose components are finite and which is above the horizon.
+    pub fn eval(&self, wi: [f64; 3], wo: [f64; 3]) -> [f64; 3] {
+        let at = position(wi, wo, self.lattice);
+        match self.cells {
+            Cells::Values(values) => self.lattice.value(at, |cell| triple(values, cell)),
+            Cells::Index8(index, lut) => self.lattice.value(at, |cell| triple(lut, index[cell] as usize)),
+            Cells::Index16(index, lut) => self.lattice.value(at, |cell| triple(lut, index[cell] as usize)),
+        }
+    }
+}
+
+impl CellLattice {
+    /// What is looked up at continuous bin numbers.
+    #[inline(always)]
+    fn value(self, at: [f64; 3], get: impl Fn(usize) -> [f64; 3]) -> [f64; 3] {
+        if self.trilinear { trilinear(at, self.bins, get) } else { get(nearest(at, self.bins) as u32 as usize) }
     }
 }
 
@@ -146,19 +166,33 @@ fn positions(pairs: &Pairs, lattice: CellLattice, at: &mut Room) {
 
 #[inline(always)]
 fn positions_for<const TRILINEAR: bool>(pairs: &Pairs, lattice: CellLattice, at: &mut Room) {
-    let half_pi = std::f64::consts::FRAC_PI_2;
-    let [bins_h, bins_d, bins_p] = lattice.bins.map(|n| n as f64);
-    let range = if lattice.reciprocal { std::f64::consts::PI } else { std::f64::consts::TAU };
     for i in 0..BATCH {
-        let [theta_h, theta_d, phi_d] = pairs.half_diff(i, lattice.reciprocal, false);
-        let u = bins_h * (theta_h * (1.0 / half_pi)).sqrt();
-        let (v, w) = (theta_d * (bins_d / half_pi), phi_d * (bins_p / range));
-        let w = if w > 0.0 { w } else { 0.0 }; // where lengths overflow, it is no number
-        let bin = |position: f64, bins: f64| position.min(bins - 1.0).floor();
-        let cell = bin(w, bins_p) + bins_p * (bin(v, bins_d) + bins_d * bin(u, bins_h));
-        let numbers = if TRILINEAR { &[u, v, w][..] } else { &[cell] };
+        let (wi, wo) = pairs.directions(i);
+        let position = position(wi, wo, lattice);
+        let cell = nearest(position, lattice.bins);
+        let numbers = if TRILINEAR { &position[..] } else { &[cell] };
         for (at, &number) in at.iter_mut().zip(numbers) {
             at[i] = number;
         }
     }
+}
+
+/// Continuous bin numbers of a pair.
+#[inline(always)]
+fn position(wi: [f64; 3], wo: [f64; 3], lattice: CellLattice) -> [f64; 3] {
+    let half_pi = std::f64::consts::FRAC_PI_2;
+    let [bins_h, bins_d, bins_p] = lattice.bins.map(|n| n as f64);
+    let range = if lattice.reciprocal { std::f64::consts::PI } else { std::f64::consts::TAU };
+    let [theta_h, theta_d, phi_d] = half_diff(wi, wo, lattice.reciprocal, false);
+    let u = bins_h * (theta_h * (1.0 / half_pi)).sqrt();
+    let (v, w) = (theta_d * (bins_d / half_pi), phi_d * (bins_p / range));
+    [u, v, if w > 0.0 { w } else { 0.0 }] // where lengths overflow, it is no number
+}
+
+/// The number of the cell that continuous bin numbers lie in.
+#[inline(always)]
+fn nearest([u, v, w]: [f64; 3], bins: [usize; 3]) -> f64 {
+    let [bins_h, bins_d, bins_p] = bins.map(|n| n as f64);
+    let bin = |position: f64, bins: f64| position.min(bins - 1.0).floor();
+    bin(w, bins_p) + bins_p * (bin(v, bins_d) + bins_d * bin(u, bins_h))
 }

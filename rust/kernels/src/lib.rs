@@ -19,8 +19,8 @@ pub use cells::{CellLattice, CellMaterial, Cells};
 pub use learner::{EMPTY, Epoch, Learner, Rule, STORED, Search};
 pub use least_squares::{Normal, Samples};
 pub use line_errors::line_errors;
-pub use lookup::{Material, Pairs, Room, eval};
-pub use nodes::{Corners, Factors, NodeMaterial, NodeSteps};
+pub use lookup::{Material, Pairs, Room, angle, eval, half_diff};
+pub use nodes::{Corners, Cubes, Factors, NodeMaterial, NodeSteps};
 pub use quantiser::Quantiser;
 pub use sweep::{Values, sweep};
 

@@ -77,39 +77,39 @@ impl Pairs {
         (known != 1.0).then_some(known)
     }
 
-    /// cos θ_i and cos θ_o of a pair.
+    /// The two directions of a pair.
     #[inline(always)]
-    pub fn cosines(&self, i: usize) -> [f64; 2] {
-        [self.0[2][i], self.0[5][i]]
-    }
-
-    /// θ_h, θ_d and φ_d of a pair, as `half_diff` gives them.
-    #[inline(always)]
-    pub fn half_diff(&self, i: usize, reciprocal: bool, mirrored: bool) -> [f64; 3] {
+    pub fn directions(&self, i: usize) -> ([f64; 3], [f64; 3]) {
         let pairs = &self.0;
-        let (sx, sy, sz) = (pairs[0][i] + pairs[3][i], pairs[1][i] + pairs[4][i], pairs[2][i] + pairs[5][i]);
-        let (vx, vy, vz) = (pairs[0][i] - pairs[3][i], pairs[1][i] - pairs[4][i], pairs[2][i] - pairs[5][i]);
-        let s = ((sx * sx + sy * sy) + sz * sz).sqrt();
-        let v = ((vx * vx + vy * vy) + vz * vz).sqrt();
-        let theta_h = atan2((sx * sx + sy * sy).sqrt(), sz);
-        let theta_d = atan2(v, s);
-        let x = 0.0 - vz * s;
-        let y = (vy * sx - vx * sy) + 0.0;
-        if mirrored {
-            return [theta_h, theta_d, atan2(y.abs(), if reciprocal { x.abs() } else { x })];
-        }
-        let other = (y < 0.0) | ((y == 0.0) & (x < 0.0));
-        let (up, across) = if other { (-y, -x + 0.0) } else { (y, x + 0.0) };
-        let folded = atan2(up, across);
-        let phi_d = if reciprocal | !other { folded } else { folded + std::f64::consts::PI };
-        [theta_h, theta_d, phi_d]
+        ([pairs[0][i], pairs[1][i], pairs[2][i]], [pairs[3][i], pairs[4][i], pairs[5][i]])
     }
+}
+
+/// θ_h, θ_d and φ_d of a pair, as `half_diff` of Python gives them; φ_d is folded to its range.
+#[inline(always)]
+pub fn half_diff(wi: [f64; 3], wo: [f64; 3], reciprocal: bool, mirrored: bool) -> [f64; 3] {
+    let (sx, sy, sz) = (wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]);
+    let (vx, vy, vz) = (wi[0] - wo[0], wi[1] - wo[1], wi[2] - wo[2]);
+    let s = ((sx * sx + sy * sy) + sz * sz).sqrt();
+    let v = ((vx * vx + vy * vy) + vz * vz).sqrt();
+    let theta_h = angle((sx * sx + sy * sy).sqrt(), sz);
+    let theta_d = angle(v, s);
+    let x = 0.0 - vz * s;
+    let y = (vy * sx - vx * sy) + 0.0;
+    if mirrored {
+        return [theta_h, theta_d, angle(y.abs(), if reciprocal { x.abs() } else { x })];
+    }
+    let other = (y < 0.0) | ((y == 0.0) & (x < 0.0));
+    let (up, across) = if other { (-y, -x + 0.0) } else { (y, x + 0.0) };
+    let folded = angle(up, across);
+    let phi_d = if reciprocal | !other { folded } else { folded + std::f64::consts::PI };
+    [theta_h, theta_d, phi_d]
 }
 
 /// The angle of (x, y) for y >= 0, in [0, π]; 0 for (0, 0). Within 2 ulp. The reduction to |t| < 7/16 and the polynomial are those
 /// of fdlibm (Sun Microsystems 1993); here without branches and with one division, so that it vectorises.
 #[inline(always)]
-fn atan2(y: f64, x: f64) -> f64 {
+pub fn angle(y: f64, x: f64) -> f64 {
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
     const ATAN_HALF: f64 = 4.636_476_090_008_061e-1;
     let a = x.abs();

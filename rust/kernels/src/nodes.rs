@@ -3,7 +3,7 @@
 
 use sommerl_codec::NodeLattice;
 
-use crate::lookup::{BATCH, Material, Pairs, Room};
+use crate::lookup::{BATCH, Material, Pairs, Room, half_diff};
 
 /// The constants of `reflectance/nodes.py`.
 const FINE: usize = sommerl_codec::FINE as usize;
@@ -121,6 +121,18 @@ impl NodeSteps {
         [below[0][0], below[0][1], below[1][0], below[1][1], after[0][0], after[0][1], after[1][0], after[1][1]]
     }
 
+    /// f_r of one pair, whose components are finite and which is above the horizon. value: of each node.
+    pub fn eval(&self, wi: [f64; 3], wo: [f64; 3], cubes: Cubes, value: impl Fn(usize) -> [f64; 4]) -> [f64; 3] {
+        let at = match (self.reciprocal, self.mirrored) {
+            (false, false) => place::<false, false>(wi, wo),
+            (false, true) => place::<false, true>(wi, wo),
+            (true, false) => place::<true, false>(wi, wo),
+            (true, true) => place::<true, true>(wi, wo),
+        };
+        let [r, g, b, _] = cubes.of(self.blend(at, at.map(step), value), cubes.factor(wi[2], wo[2]));
+        [r, g, b]
+    }
+
     /// The value at a place on the fine grid. step: that it lies in.
     #[inline(always)]
     fn blend(&self, place: [f64; 3], step: [u8; 3], value: impl Fn(usize) -> [f64; 4]) -> [f64; 4] {
@@ -179,7 +191,7 @@ impl Factors<'_> {
 
     /// The value of a node, as four numbers for vectors to hold; the last means nothing.
     #[inline(always)]
-    fn value(&self, node: usize) -> [f64; 4] {
+    pub fn value(&self, node: usize) -> [f64; 4] {
         match (entry(self.gains, self.gain, node), entry(self.shapes, self.shape, node)) {
             (Some(gain), Some(shape)) => [gain * shape[0], gain * shape[1], gain * shape[2], 0.0],
             _ => [f64::NAN; 4],
@@ -192,34 +204,55 @@ fn entry<'a, T>(entries: &'a [T], index: &[u16], node: usize) -> Option<&'a T> {
     index.get(node).and_then(|&number| entries.get(number as usize))
 }
 
-/// A compact material.
-pub struct NodeMaterial<'a> {
-    steps: &'a NodeSteps,
-    factors: Factors<'a>,
+/// How blended values become f_r: they are cubed, and divided by cosines.
+#[derive(Clone, Copy)]
+pub struct Cubes {
     scale: f64,
     /// Blended values up to this one count as 0.
     least: f64,
     /// Whether the cosines that cubes are divided by end smoothly.
     smooth: bool,
+}
+
+impl Cubes {
+    /// scale: of the cube-root domain. signed: whether blended values below 0 count, and not as 0. smooth: whether the cosines
+    /// that their cubes are divided by end smoothly.
+    pub fn new(scale: f64, signed: bool, smooth: bool) -> Self {
+        Cubes { scale, least: if signed { f64::NEG_INFINITY } else { 0.0 }, smooth }
+    }
+
+    /// What cubes are multiplied with.
+    #[inline(always)]
+    fn factor(&self, cos_i: f64, cos_o: f64) -> f64 {
+        let damped = if self.smooth {
+            ((cos_i * cos_i + HORIZON) * (cos_o * cos_o + HORIZON)).sqrt()
+        } else {
+            cos_i.max(SMALLEST_COSINE) * cos_o.max(SMALLEST_COSINE)
+        };
+        self.scale / damped
+    }
+
+    #[inline(always)]
+    fn of(&self, blended: [f64; 4], factor: f64) -> [f64; 4] {
+        blended.map(|y| if y > self.least { y * y * y * factor } else { 0.0 })
+    }
+}
+
+/// A compact material.
+pub struct NodeMaterial<'a> {
+    steps: &'a NodeSteps,
+    factors: Factors<'a>,
+    cubes: Cubes,
     /// The values of all nodes. Empty for few pairs, whose lookup takes less time than to calculate these.
     values: Vec<[f64; 4]>,
 }
 
 impl<'a> NodeMaterial<'a> {
-    /// scale: of the cube-root domain. signed: whether blended values below 0 count, and not as 0. smooth: whether the cosines
-    /// that their cubes are divided by end smoothly. pairs: how many it will be evaluated for.
-    pub fn new(
-        steps: &'a NodeSteps,
-        factors: Factors<'a>,
-        scale: f64,
-        signed: bool,
-        smooth: bool,
-        pairs: usize,
-    ) -> Self {
+    /// pairs: how many it will be evaluated for.
+    pub fn new(steps: &'a NodeSteps, factors: Factors<'a>, cubes: Cubes, pairs: usize) -> Self {
         let count = if pairs > steps.nodes / 6 { steps.nodes } else { 0 };
         let values = (0..count).map(|node| factors.value(node)).collect();
-        let least = if signed { f64::NEG_INFINITY } else { 0.0 };
-        NodeMaterial { steps, factors, scale, least, smooth, values }
+        NodeMaterial { steps, factors, cubes, values }
     }
 
     /// Places of a batch on the fine grid, the steps that they lie in, and what cubes are multiplied with.
@@ -231,18 +264,13 @@ impl<'a> NodeMaterial<'a> {
         steps: &mut [[u8; BATCH]; 3],
     ) {
         for i in 0..BATCH {
-            let place = place::<RECIPROCAL, MIRRORED>(pairs.half_diff(i, RECIPROCAL, MIRRORED));
+            let (wi, wo) = pairs.directions(i);
+            let place = place::<RECIPROCAL, MIRRORED>(wi, wo);
             for c in 0..3 {
                 at[c][i] = place[c];
                 steps[c][i] = step(place[c]);
             }
-            let [cos_i, cos_o] = pairs.cosines(i);
-            let damped = if self.smooth {
-                ((cos_i * cos_i + HORIZON) * (cos_o * cos_o + HORIZON)).sqrt()
-            } else {
-                cos_i.max(SMALLEST_COSINE) * cos_o.max(SMALLEST_COSINE)
-            };
-            at[3][i] = self.scale / damped;
+            at[3][i] = self.cubes.factor(wi[2], wo[2]);
         }
     }
 
@@ -255,13 +283,13 @@ impl<'a> NodeMaterial<'a> {
         out: &mut [f64],
         value: impl Fn(usize) -> [f64; 4],
     ) {
-        let least = self.least;
+        let cubes = self.cubes;
         for i in 0..BATCH.min(out.len() / 3) {
             let f_r = match pairs.known(i) {
                 Some(known) => [known; 4],
                 None => {
                     let y = self.steps.blend([0, 1, 2].map(|c| at[c][i]), steps.map(|step| step[i]), &value);
-                    y.map(|y| if y > least { y * y * y * at[3][i] } else { 0.0 })
+                    cubes.of(y, at[3][i])
                 }
             };
             match out.get_mut(3 * i..3 * i + 4) {
@@ -301,9 +329,10 @@ fn step(place: f64) -> u8 {
     unsafe { place.to_int_unchecked::<i32>() as u8 }
 }
 
-/// The place on the fine grid of half/difference angles.
+/// The place of a pair on the fine grid.
 #[inline(always)]
-fn place<const RECIPROCAL: bool, const MIRRORED: bool>([theta_h, theta_d, phi_d]: [f64; 3]) -> [f64; 3] {
+fn place<const RECIPROCAL: bool, const MIRRORED: bool>(wi: [f64; 3], wo: [f64; 3]) -> [f64; 3] {
+    let [theta_h, theta_d, phi_d] = half_diff(wi, wo, RECIPROCAL, MIRRORED);
     use std::f64::consts::{FRAC_PI_2, TAU};
     let range = TAU / if RECIPROCAL { 2.0 } else { 1.0 } / if MIRRORED { 2.0 } else { 1.0 };
     let a = (theta_h * (1.0 / FRAC_PI_2)).sqrt();

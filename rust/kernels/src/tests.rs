@@ -7,8 +7,8 @@ use sommerl_simd::InstructionSet;
 
 use crate::threads::share_out;
 use crate::{
-    CellLattice, CellMaterial, Cells, Epoch, Factors, Learner, Material, NodeMaterial, NodeSteps, Quantiser, Rule,
-    Search, eval,
+    CellLattice, CellMaterial, Cells, Cubes, Epoch, Factors, Learner, Material, NodeMaterial, NodeSteps, Quantiser,
+    Rule, Search, eval,
 };
 
 /// Numbers from 0 to 1 that look random.
@@ -112,6 +112,15 @@ fn same_everywhere(material: &impl Material, expected: &[[u64; 3]]) -> bool {
     kinds && InstructionSet::available().all(|set| [1, 3].iter().all(|&n| looked_up(material, set, n) == expected))
 }
 
+/// Whether pairs above the horizon give the same one by one.
+fn one_by_one_too(eval: impl Fn([f64; 3], [f64; 3]) -> [f64; 3], expected: &[[u64; 3]]) -> bool {
+    let pairs = directions(1000, 4).into_iter().zip(directions(1000, 5));
+    let above =
+        |(wi, wo): &([f64; 3], [f64; 3])| wi.iter().chain(wo).all(|x| x.is_finite()) && wi[2] > 0.0 && wo[2] > 0.0;
+    let mut asked = pairs.zip(expected).filter(|(pair, _)| above(pair));
+    asked.all(|((wi, wo), f_r)| eval(wi, wo).map(f64::to_bits) == *f_r)
+}
+
 #[test]
 fn lookup_in_cells() {
     let mut next = numbers(6);
@@ -129,6 +138,10 @@ fn lookup_in_cells() {
             assert!(same_everywhere(&narrow, &found[1]));
             assert!(same_everywhere(&wide, &found[1]));
             assert!(!same_everywhere(&direct, &found[1]));
+            for (material, found) in [&direct, &narrow, &wide].into_iter().zip([&found[0], &found[1], &found[1]]) {
+                assert!(one_by_one_too(|wi, wo| material.eval(wi, wo), found));
+            }
+            assert!(!one_by_one_too(|wi, wo| direct.eval(wi, wo), &found[1]));
         }
     }
 }
@@ -170,10 +183,15 @@ fn looks_up_on_nodes(phi_d: Vec<u8>, reciprocal: bool, mirrored: bool, signed: b
     let (gain, shape): (Vec<u16>, Vec<u16>) = (0..30).map(|_| ((next() * 9.0) as u16, (next() * 8.0) as u16)).unzip();
     let factors = Factors { gains: &gains, shapes: &shapes, gain: &gain, shape: &shape };
     assert!(factors.fit(30) && !factors.fit(29));
-    let made = |factors, pairs| NodeMaterial::new(&steps, factors, 0.3, signed, false, pairs);
+    let made = |factors, pairs| NodeMaterial::new(&steps, factors, Cubes::new(0.3, signed, false), pairs);
     let expected = looked_up(&made(factors, 1000), InstructionSet::PORTABLE, 1);
     let below = |bits: &u64| f64::from_bits(*bits) < 0.0;
     assert_eq!(expected.as_flattened().iter().any(below), signed);
+    let one_by_one = |scale| {
+        let cubes = Cubes::new(scale, signed, false);
+        one_by_one_too(|wi, wo| steps.eval(wi, wo, cubes, |node| factors.value(node)), &expected)
+    };
+    assert!(one_by_one(0.3) && !one_by_one(0.4));
     for pairs in [0, 1000] {
         assert!(same_everywhere(&made(factors, pairs), &expected));
         let outside = Factors { gain: &gain[..9], shapes: &shapes[..3], ..factors };
