@@ -1,8 +1,9 @@
 """A retro-reflective lobe: GGX microfacets that send light back to where it came from, as tapes and road signs do.
 
 The viewer is mirrored about the normal before the half vector is formed: the back vector of Belcour, Pacanowski,
-Delahaie, Laville-Geay & Eupherte 2014, "Bidirectional Reflectance Distribution Function Measurements and Analysis of Retroreflective Materials", JOSA A
-31(12); the retroreflective mode of MaterialX's GGX nodes does the same. So its albedo is that of GGX.
+Delahaie, Laville-Geay & Eupherte 2014, "Bidirectional Reflectance Distribution Function Measurements and Analysis of
+Retroreflective Materials", JOSA A 31(12); the retroreflective mode of MaterialX's GGX nodes does the same. The albedo
+is that of GGX.
 """
 
 from __future__ import annotations
