@@ -16,14 +16,14 @@ from sommerl.sampling.named import OURS, SAMPLERS
 
 SIZE, BLOCK, BATCHES, SPP = 24, 4, 32, 128
 OTHERS = [kind for kind in SAMPLERS.values() if kind is not OURS]
-MATERIALS = ("blue-metallic-paint", "beige-fabric")
+NAME = "blue-metallic-paint"  # which has both a highlight and a diffuse part
 
 
 @cache
-def images(kind, name):
+def images(kind):
     """Renderings with independent random numbers, (batches, blocks, 3): means over blocks of pixels that show nothing
     but the object, whose noise is nearly Gaussian."""
-    scene = sphere(builtin(name), default_environment(64), sampler=kind.fitted(builtin(name)), size=SIZE)
+    scene = sphere(builtin(NAME), default_environment(64), sampler=kind.fitted(builtin(NAME)), size=SIZE)
     # Another seed for every sampler: the same numbers could give the same noise.
     first = BATCHES * [*SAMPLERS.values(), TooDense].index(kind)
     batches = [render(scene, spp=SPP, seed=first + batch) for batch in range(BATCHES)]
@@ -46,9 +46,7 @@ class TooDense(HalfVectorSampler):
         return 1.1 * super().density(wi, wo, buffers)
 
 
-@pytest.mark.parametrize("name", MATERIALS)
 @pytest.mark.parametrize("kind", OTHERS, ids=lambda kind: kind.name)
-def test_every_sampler_gives_the_same_image(kind, name):
-    tests = len(OTHERS) * len(MATERIALS)
-    check_same_image(images(kind, name), images(OURS, name), tests)
-    must_fail(check_same_image, images(kind, name), images(TooDense, name), tests)
+def test_every_sampler_gives_the_same_image(kind):
+    check_same_image(images(kind), images(OURS), len(OTHERS))
+    must_fail(check_same_image, images(kind), images(TooDense), len(OTHERS))
