@@ -121,6 +121,7 @@ def _towards(family, shape, elevation, resolution):
     # angles; Lafortune's may be anywhere.
     lean = {"phong": -1.0, "lafortune": shape[0]}.get(family.name)
     if lean is None:
-        return over_half_vectors(elevation, width, **resolution)
+        wi, solid_angle = over_half_vectors(elevation, width, **resolution)
+        return (wi * np.array([-1, -1, 1]) if family.name == "retro-ggx" else wi), solid_angle
     x, _, z = spherical(elevation, 0.0)
     return over_directions((lean * x, 0.0, z), 2 * width, **resolution)

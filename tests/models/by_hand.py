@@ -98,3 +98,8 @@ def ggx(wi, wo, alpha, f0):
     d = alpha**2 / (np.pi * h[:, 2] ** 4 * (alpha**2 + tan2_h) ** 2)
     lambdas = [(np.sqrt(1 + alpha**2 * (1 / w[:, 2] ** 2 - 1)) - 1) / 2 for w in (wi, wo)]
     return d * schlick(h, wo, f0) / (1 + lambdas[0] + lambdas[1]) / (4 * wi[:, 2] * wo[:, 2])
+
+
+def retro_ggx(wi, wo, alpha, f0):
+    """By the back vector: the light is mirrored, in place of the viewer, which is the same by symmetry."""
+    return ggx(wi * np.array([-1, -1, 1]), wo, alpha, f0)

@@ -25,6 +25,7 @@ SHAPES = {
     "torrance-sparrow": [(0.02, 0.04), (0.15, 0.3), (1.0, 0.9)],
     "ashikhmin-shirley": [(1.0, 0.04), (100.0, 0.3), (5000.5, 0.9)],
     "ggx": [(0.02, 0.04), (0.15, 0.3), (1.0, 0.9)],
+    "retro-ggx": [(0.02, 0.04), (0.15, 0.3), (1.0, 0.9)],
 }
 ALL = [(family, shape) for family in FAMILY_LIST for shape in SHAPES[family.name]]
 
@@ -101,7 +102,7 @@ def check_families(families):
     assert [family.name for family in families.values() if family.diffuse] == ["lambertian", "oren-nayar"]
 
 
-def test_there_are_eleven_families():
+def test_there_are_twelve_families():
     check_families(FAMILIES)
     must_fail(check_families, {**FAMILIES, "phong": LAFORTUNE})
     must_fail(check_families, {**FAMILIES, "phong": replace(PHONG, exponent=None)})

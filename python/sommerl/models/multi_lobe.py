@@ -25,6 +25,7 @@ from .lafortune import LAFORTUNE
 from .lambertian import LAMBERTIAN
 from .oren_nayar import OREN_NAYAR
 from .phong import PHONG
+from .retro_ggx import RETRO_GGX
 from .torrance_sparrow import TORRANCE_SPARROW
 from .ward import WARD
 from .ward_duer import WARD_DUER
@@ -43,6 +44,7 @@ FAMILIES: dict[str, Family] = {
         TORRANCE_SPARROW,
         ASHIKHMIN_SHIRLEY,
         GGX,
+        RETRO_GGX,
     )
 }
 
