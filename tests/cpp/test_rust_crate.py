@@ -85,7 +85,7 @@ def test_materials_of_libraries(tmp_path):
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
 def test_golden_files_that_are_cut_off_or_changed(path):
     data = path.read_bytes()
-    damaged = compact.broken(data)[:: 5 if path.suffix == ".smrlib" else 1] + [data + b"\0"]
+    damaged = [*compact.broken(data)[:: 5 if path.suffix == ".smrlib" else 1], data + b"\0"]
     assert set(codes(example("probe"), damaged)) <= set(ERRORS) - {"none", "not_loaded", "file", "memory", "missing"}
     assert codes(example("probe"), [data]) == ["none"]
 
