@@ -52,6 +52,28 @@ def test_a_regular_grid_is_recognised():
     must_fail(check_near, from_samples(Samples(GRID.wi, GRID.wo, 1.02 * GRID.f_r), name="x"), 0.005)
 
 
+@pytest.mark.parametrize("scale", [1.0, 1e-4])
+def test_at_the_normal_all_azimuths_are_one_point(scale):
+    """Each point there is repeated in the file, once for every azimuth, and for both directions."""
+    assert (GRID.wi[:, 2] == 1).sum() > 100
+    constant = Samples(GRID.wi, GRID.wo, np.full_like(GRID.f_r, scale))
+    values = grid_of(constant, name="x").values
+    check_constant(values, scale)
+    must_fail(check_constant, np.where(np.arange(values.shape[1])[:, None, None] == 0, values / 19, values), scale)
+
+
+def check_constant(values, scale):
+    assert values == pytest.approx(scale, rel=1e-6)
+
+
+def test_dark_materials_have_relative_errors_too():
+    dark = GRID.f_r * 1e-4
+    samples, half = Samples(GRID.wi, GRID.wo, dark), Samples(GRID.wi, GRID.wo, 0.5 * dark)
+    found = figures(samples, grid_of(half, name="half"))
+    assert [found[key] for key in ("median", "at_peak")] == pytest.approx([0.5, -0.5], abs=0.02)
+    assert held_out.sizes(np.zeros((3, 3))).min() > 0
+
+
 def test_what_is_no_fine_grid_is_fitted():
     assert grid_of(GRID.some(np.arange(0, len(GRID.wi), 2)), name="x") is None  # half of it is missing
     coarse = on_grid(FABRIC, step=12.0, phi_step=30.0)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ..reflectance.arrays import split
 from ..reflectance.brdf import Brdf
-from ..reflectance.distance import LOG_FLOOR
 from ..reflectance.grid import GridBrdf
 from ..reflectance.samples import Samples
 from ..system.errors import FormatError, MaterialError
@@ -39,11 +38,9 @@ def _points(grid: GridBrdf) -> Samples:
 
 
 def relative_errors(samples: Samples, brdf: Brdf) -> Floats:
-    """|f_r − measured| over what was measured, channels added, of each sample, (n). Below LOG_FLOOR in a channel, what
-    was measured counts as that much."""
+    """|f_r − measured| over what was measured (`held_out.sizes`), channels added, of each sample, (n)."""
     found = brdf.eval(samples.wi, samples.wo)
-    size = np.maximum(np.abs(samples.f_r).sum(axis=1), 3 * LOG_FLOOR)
-    errors: Floats = np.abs(found - samples.f_r).sum(axis=1) / size
+    errors: Floats = np.abs(found - samples.f_r).sum(axis=1) / held_out.sizes(samples.f_r)
     return errors
 
 
@@ -51,15 +48,15 @@ def figures(samples: Samples, brdf: Brdf) -> Figures:
     """samples: how many; median, percentile_95, worst: of their relative errors; at_peak: of the brightest one, with
     its sign: -0.1 where a tenth of the peak is lost."""
     errors = relative_errors(samples, brdf)
-    brightest = slice(int(samples.f_r.sum(axis=1).argmax()), None)
-    peak = Samples(samples.wi[brightest][:1], samples.wo[brightest][:1], samples.f_r[brightest][:1])
-    said, measured = brdf.eval(peak.wi, peak.wo).sum(), peak.f_r.sum()
+    place = int(samples.f_r.sum(axis=1).argmax())
+    brightest = slice(place, place + 1)
+    said, measured = brdf.eval(samples.wi[brightest], samples.wo[brightest]).sum(), samples.f_r[place].sum()
     return {
         "samples": len(errors),
         "median": float(np.median(errors)),
         "percentile_95": float(np.percentile(errors, 95)),
         "worst": float(errors.max()),
-        "at_peak": float((said - measured) / max(abs(measured), LOG_FLOOR)),
+        "at_peak": float((said - measured) / held_out.sizes(samples.f_r)[place]),
     }
 
 

@@ -50,12 +50,12 @@ def grid_of(
     count = np.bincount(flat, minlength=points).reshape(shape)
     sums = np.stack([np.bincount(flat, weights=channel, minlength=points) for channel in samples.f_r.T], axis=-1)
     values = sums.reshape(*shape, 3) / np.maximum(count, 1)[..., None]
+    missing = count == 0
     for axis, at in ((light, (0, slice(None))), (viewer, (slice(None), 0))):
         if axis[0] <= AT_NORMAL:  # Δφ means nothing there: what was measured at any stands for all
             total, seen = sums.reshape(*shape, 3)[at].sum(axis=-2), count[at].sum(axis=-1)
             values[at] = (total / np.maximum(seen, 1)[..., None])[..., None, :]
-            count[at] = seen[..., None]
-    missing = count == 0
+            missing[at] = seen[..., None] == 0
     if missing.mean() > MOST_MISSING or missing.all(axis=2).any():
         return None
     _fill(values, missing, azimuths)

@@ -82,11 +82,19 @@ def chosen(samples: Samples, both_sides: BothSides) -> Choice:
     return min(found, key=lambda each: each[0])[1]
 
 
+def sizes(f_r: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What relative errors are over, (n): the channels added, and at least LOG_FLOOR in each, or the median of all
+    samples where that is less: dark materials have relative errors, too."""
+    found = np.abs(f_r).sum(axis=1)
+    usual = np.median(found[found > 0]) if found.any() else np.inf
+    return np.maximum(found, min(3 * LOG_FLOOR, float(usual)))
+
+
 def _errors(samples: Samples, said: NDArray[np.float64]) -> tuple[float, float, float]:
     """The mean and the RMS error of the logarithm, with cosines; and the median relative error."""
     found, true = np.maximum(said, 0), np.maximum(samples.f_r, 0)
     weight = (samples.wi[:, 2] * samples.wo[:, 2])[:, None]
     logs = np.log(found + LOG_FLOOR) - np.log(true + LOG_FLOOR)
-    relative = np.abs(found - true).sum(axis=1) / np.maximum(true.sum(axis=1), LOG_FLOOR)
+    relative = np.abs(found - true).sum(axis=1) / sizes(true)
     mean, square = ((weight * each).sum() / (3 * weight.sum()) for each in (np.abs(logs), logs**2))
     return float(mean), float(np.sqrt(square)), float(np.median(relative))
