@@ -1,7 +1,6 @@
 """How near a prior comes to materials that it never saw, from few samples.
 
     uv run python benchmarks/few_samples.py [--data NP_FOLDER] [--cache FILE.npz] [--every 1]
-    uv run python benchmarks/few_samples.py --make FOLDER
 
 Each of the 99 NP stand-ins is sampled as a table of 90 × 24 × 36 cells, and estimated by a prior of the four fifths of
 the stand-ins among which it is not, as they are in the package. Samples are at cells drawn at random, each as likely as
@@ -9,7 +8,7 @@ another, as in Zheng et al. 2021 (--every N: of one material in N); at cells dra
 plans them. Samples have no noise. PSNR is in soft light, against the table. `inside`: the share of all cells, by solid
 angles and cosines, whose logarithm is within one and two standard deviations of the estimate.
 
---make writes the stand-ins into FOLDER, of which the package's file was made by
+The package's file was made from MERL tables of the stand-ins (../shared/tools/np_to_merl.py) by
 
     sommerl library build FOLDER -o LIBRARY --preset compact --target-size 4.8kB
     sommerl library pack LIBRARY -o python/sommerl/formats/stand_ins/np.smrlib
@@ -25,7 +24,6 @@ from typing import Any
 import numpy as np
 from stand_in_library import LATTICE, NP, bases, material
 
-from sommerl import save
 from sommerl.formats.prior import DEVIATIONS, SMALL, Prior, sampled, stand_ins
 from sommerl.reflectance.half_diff import directions
 from sommerl.reflectance.samples import Samples
@@ -39,15 +37,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=NP)
     parser.add_argument("--cache", type=Path, default=Path("few_samples.npz"), help="what was decoded stays there")
-    parser.add_argument("--make", type=Path, metavar="FOLDER")
     parser.add_argument("--every", type=int, default=1)
     options = parser.parse_args()
     tables = {name: material(name, values) for name, values in bases(options.data, options.cache).items()}
-    if options.make:
-        options.make.mkdir(parents=True, exist_ok=True)
-        for name, table in tables.items():
-            save(table, options.make / f"{name}.smrl")
-        return 0
     known = {name: sampled(brdf) for name, brdf in stand_ins().items()}
     names = sorted(tables)
     found: dict[tuple[int, str], dict[str, Any]] = {run: {} for run in RUNS}

@@ -6,14 +6,28 @@ import sys
 import time
 
 import pytest
-from helpers import PATIENCE, interrupting, launch, run, run_json
+from helpers import PATIENCE, interrupting, lambertian_table, launch, run, run_json
 
+from sommerl import TrainOptions, save, train
 from sommerl.commands import console
 from sommerl.render import checkpoint, passes
 from sommerl.render.environment import default_environment
 from sommerl.render.images import write_image
 
 SMALL = ["--size", "24", "--spp", "4"]
+
+
+def material(path, albedo):
+    """One that Mitsuba compiles in no time."""
+    save(train(lambertian_table(albedo), TrainOptions(clusters=1, epochs=1))[0], path)
+    return path
+
+
+@pytest.fixture
+def grey(tmp_path):
+    return material(tmp_path / "grey.smrl", 0.5)
+
+
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 EAGER = """
 import sys
@@ -46,7 +60,7 @@ OWN = """<scene version="3.0.0">
     <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/><rfilter type="box"/>
     </film></sensor>
   <emitter type="constant"/>
-  <shape type="sphere"><bsdf type="sommerl"><string name="filename" value="nickel"/></bsdf></shape>
+  <shape type="sphere"><bsdf type="sommerl"><string name="filename" value="{}"/></bsdf></shape>
 </scene>
 """
 
@@ -63,10 +77,10 @@ OWN = """<scene version="3.0.0">
     ],
     ids=["kill", "int", "term", "scalar", "kill-own", "term-own"],
 )
-def test_killed_and_started_again_it_goes_on_to_the_same_image(tmp_path, kind, before, own):
+def test_killed_and_started_again_it_goes_on_to_the_same_image(tmp_path, grey, kind, before, own):
     """Without LLVM, Mitsuba hands over a pass that was interrupted as it is, with a part of its pixels black."""
-    (tmp_path / "own.xml").write_text(OWN)
-    scene = [tmp_path / "own.xml"] if own else ["--scene", "statue", "--size", 32]
+    (tmp_path / "own.xml").write_text(OWN.format(grey))
+    scene = [tmp_path / "own.xml"] if own else ["--scene", "statue", grey, "--size", 32]
     options = "render", *scene, "--spp", 64 if before else 1024, "--json"
     whole, path = tmp_path / "whole.exr", tmp_path / "out.exr"
     part = tmp_path / "out.exr.sommerl-part"
@@ -94,17 +108,17 @@ def test_killed_and_started_again_it_goes_on_to_the_same_image(tmp_path, kind, b
     assert path.read_bytes() == whole.read_bytes()
 
 
-def test_a_file_in_the_place_of_a_checkpoint_that_is_none(capsys, tmp_path):
+def test_a_file_in_the_place_of_a_checkpoint_that_is_none(capsys, tmp_path, grey):
     part = tmp_path / "x.png.sommerl-part"
     part.mkdir()
-    status, _, err = run(capsys, "render", "nickel", "-o", tmp_path / "x.png", *SMALL)
+    status, _, err = run(capsys, "render", grey, "-o", tmp_path / "x.png", *SMALL)
     assert status == 2
     assert err == f"error: {part}: the render's checkpoint needs this name, which something else has: rename that\n"
     assert not (tmp_path / "x.png").exists()
     part.rmdir()
     for number, content in (("", b""), (2, b"something else"), (3, b"SMRP\1\0 and nothing more")):
         part.write_bytes(content)
-        status, _, err = run(capsys, "render", "nickel", "-o", tmp_path / "x.png", *SMALL)
+        status, _, err = run(capsys, "render", grey, "-o", tmp_path / "x.png", *SMALL)
         aside = tmp_path / f"{part.name}.damaged{number}"
         assert status == 0
         assert err.startswith(f"warning: {part}: it is damaged or not a checkpoint (")
@@ -121,38 +135,39 @@ CHANGES = {
     "sampler": ["--sampler", "cosine"],
     "environment": ["--envmap", "{}/light.exr"],
     "mesh": ["--mesh", "{}/mesh.obj"],
-    "material 1": ["nickel"],
-    "reference 1": ["--against", "nickel"],
+    "material 1": ["{}/other.smrl"],
+    "reference 1": ["--against", "{}/other.smrl"],
     "scene": ["--scene", "sphere"],
 }
 
 
 @pytest.mark.parametrize("what", CHANGES)
-def test_whatever_decides_the_pixels_makes_it_another_render(capsys, tmp_path, monkeypatch, what):
+def test_whatever_decides_the_pixels_makes_it_another_render(capsys, tmp_path, monkeypatch, grey, what):
     monkeypatch.setattr(checkpoint, "SECONDS", 0.0)
     monkeypatch.setattr(passes, "SAMPLES_A_PASS", 2**13)
     write_image(tmp_path / "light.exr", default_environment(16))
     (tmp_path / "mesh.obj").write_text(TRIANGLE)
-    usual = ["--scene", "statue", "chrome", "--size", "24", "--spp", "64", "--seed", "0", "-o", f"{tmp_path}/x.exr"]
+    material(tmp_path / "other.smrl", 0.6)
+    usual = ["--scene", "statue", str(grey), "--size", "24", "--spp", "64", "--seed", "0", "-o", f"{tmp_path}/x.exr"]
     with monkeypatch.context() as patch:
         patch.setattr(console, "progress", interrupting)
         with pytest.raises(KeyboardInterrupt):
             run(capsys, "render", *usual)
     change = [each.format(tmp_path) for each in CHANGES[what]]
-    given = [each for each in usual if each != "chrome"] if what == "material 1" else usual
+    given = [each for each in usual if each != str(grey)] if what == "material 1" else usual
     status, _, err = run(capsys, "render", *given, *change)
     assert status == 0
     assert f"it is of a render with another {what}; this render starts anew" in err
 
 
-def test_a_checkpoint_that_cannot_be_written_stops_nothing(capsys, tmp_path, monkeypatch):
+def test_a_checkpoint_that_cannot_be_written_stops_nothing(capsys, tmp_path, monkeypatch, grey):
     def full(path):
         raise OSError(28, "No space left on device", str(path))
 
     monkeypatch.setattr(checkpoint, "SECONDS", 0.0)
     monkeypatch.setattr(passes, "SAMPLES_A_PASS", 2**10)
     monkeypatch.setattr(checkpoint, "atomic_write", full)
-    status, _, err = run(capsys, "render", "nickel", "-o", tmp_path / "x.png", *SMALL)
+    status, _, err = run(capsys, "render", grey, "-o", tmp_path / "x.png", *SMALL)
     assert status == 0
     assert err.count("\n") == 1
     assert "No space left on device; the render goes on" in err
@@ -167,10 +182,10 @@ sys.exit(main())
 """
 
 
-def test_one_processor_will_do(capsys, tmp_path):
+def test_one_processor_will_do(capsys, tmp_path, grey):
     """Mitsuba's readers and writers of OpenEXR wait for a second thread."""
     write_image(tmp_path / "light.exr", default_environment(16))
-    options = "render", "nickel", "--envmap", tmp_path / "light.exr", *SMALL
+    options = "render", grey, "--envmap", tmp_path / "light.exr", *SMALL
     done = subprocess.run([sys.executable, "-c", ONE_CPU, *map(str, options), "-o", tmp_path / "x.exr"], timeout=120)
     assert done.returncode == 0
     run_json(capsys, *options, "-o", tmp_path / "y.exr")
