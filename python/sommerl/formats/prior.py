@@ -26,6 +26,7 @@ from ..reflectance.cells import HALF_PI, Lattice
 from ..reflectance.half_diff import directions, half_diff
 from ..reflectance.samples import Samples, polar_angles
 from ..reflectance.table import BrdfTable
+from ..system import door
 
 FEWEST, MOST = 10, 1500  # samples
 LATTICE = Lattice(90, 24, 36)  # of the materials
@@ -182,9 +183,9 @@ def sampled(brdf: Brdf) -> Singles:
 
 def stand_ins() -> dict[str, Brdf]:
     """The materials of the prior that comes with the package, by their names."""
-    data = STAND_INS.read_bytes()
-    library = LibraryFile(lambda start, size: data[start : start + size], len(data))
-    return {name: file.decode(library.data(name)) for name in library.index.names()}
+    with door.opened(str(STAND_INS)) as opened:
+        library = LibraryFile(opened.part, opened.length)
+        return {name: file.decode(library.data(name)) for name in library.index.names()}
 
 
 @cache
