@@ -25,8 +25,8 @@ def lobe(a: Angles, alpha: Array, f0: Array) -> Array:
 
 RETRO_GGX = Family(
     name="retro-ggx",
-    source="Belcour, Pacanowski, Delahaie, Laville-Geay & Eupherte 2014, BRDF Measurements of Retroreflective "
-    "Materials, JOSA A 31(12)",
+    source="Belcour, Pacanowski, Delahaie, Laville-Geay & Eupherte 2014, Bidirectional Reflectance "
+    "Distribution Function Measurements and Analysis of Retroreflective Materials, JOSA A 31(12)",
     parameters=ggx.GGX.parameters,
     lobe=lobe,
     conserves_energy=True,
