@@ -20,7 +20,7 @@ from scipy.optimize import least_squares
 
 from sommerl import load_table
 from sommerl.fitting.data import samples_of
-from sommerl.fitting.objective import LOG_EPSILON
+from sommerl.fitting.loss import LOG_EPSILON
 from sommerl.fitting.options import FitOptions, Loss, families_of
 from sommerl.fitting.search import Search
 from sommerl.models.family import Family

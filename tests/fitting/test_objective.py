@@ -5,7 +5,8 @@ from helpers import must_fail
 from sommerl import builtin
 from sommerl.fitting import FitOptions
 from sommerl.fitting.data import DIAMETER, lattice, samples_of, sphere
-from sommerl.fitting.objective import LOG_EPSILON, Objective, least_squares
+from sommerl.fitting.loss import LOG_EPSILON
+from sommerl.fitting.objective import Objective, least_squares
 from sommerl.fitting.options import families_of
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
 from sommerl.reflectance.cells import MERL

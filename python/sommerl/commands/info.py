@@ -14,10 +14,17 @@ from . import answers, console
 from .arguments import Material, ReadingArguments, positional
 from .inputs import expanded, readable
 from .parser import add_command
-from .rows import fact_rows, lobe_text, origin_rows, text
+from .rows import fact_rows, lobe_text, origin_rows, surface_text, text
 
 COUNTS = tuple(asdict(Counts()))
-HIDDEN = ("facts", "input", "lobes", "made_from", "measured_against")  # keys that people see in rows of their own
+HIDDEN = (
+    "facts",
+    "input",
+    "lobes",
+    "made_from",
+    "measured_against",
+    "surface",
+)  # keys that people see in rows of their own
 SIZES = ("bytes_paper", "bytes_memory", "bytes_disk")
 COLUMNS = {
     "kind": "kind",
@@ -68,7 +75,8 @@ def _rows(known: Mapping[str, Any], brdf: Brdf) -> dict[str, str]:
     rows = {key: console.size(value) if key in SIZES else text(value) for key, value in shown.items()}
     counted = {key: known[key] for key in COUNTS if known[key] is not None}
     rows |= fact_rows(counted | (known["facts"] or {})) | origin_rows(brdf)
-    return rows | {f"lobe {number}": lobe_text(lobe) for number, lobe in enumerate(known["lobes"] or [], 1)}
+    rows |= {f"lobe {number}": lobe_text(lobe) for number, lobe in enumerate(known["lobes"] or [], 1)}
+    return rows | ({known["surface"]["model"]: surface_text(known["surface"])} if known["surface"] else {})
 
 
 def _print_table(found: Sequence[Mapping[str, Any]]) -> None:

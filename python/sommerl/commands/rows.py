@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from ..reflectance import metric
 from ..reflectance.brdf import Brdf
 from ..reflectance.distance import TABLE_METRICS
@@ -93,6 +95,15 @@ def lobe_text(lobe: Mapping[str, Any]) -> str:
     numbers = [f"albedo {' '.join(f'{value:.4g}' for value in lobe['albedo'])}"]
     numbers += [f"{key} {value:.4g}" for key, value in lobe.items() if key not in ("family", "albedo")]
     return f"{lobe['family']}: {', '.join(numbers)}"
+
+
+def surface_text(surface: Mapping[str, Any]) -> str:
+    """A standard's surface, as `Surface.as_json` gives it, for people."""
+    inputs: list[str] = []
+    for key, value in surface.items():
+        if key != "model":
+            inputs.append(f"{key} {' '.join(f'{x:.4g}' for x in np.atleast_1d(value).tolist())}")
+    return ", ".join(inputs)
 
 
 def text(value: Any) -> str:

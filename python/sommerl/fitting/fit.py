@@ -8,21 +8,28 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..models.multi_lobe import MultiLobe
+from ..models.standard import Surface
+from ..models.standards import STANDARDS
 from ..reflectance.brdf import Brdf
+from ..reflectance.samples import Samples
 from ..system import jit
 from .data import samples_of
-from .options import FitOptions, all_models, families_of, family
+from .options import FitOptions, all_models, check_model, families_of, family
 from .search import REFINED, Search
+from .surface import SurfaceSearch
 
 Progress = Callable[[int, int], None]  #: steps done, steps in all
 
 
 @dataclass(frozen=True)
 class Start:
-    """One starting point of a search. shapes: the parameters of each lobe. error: over all samples, of what was found
-    from there with a part of the samples, before the best results were refined."""
+    """One starting point of a search.
 
-    shapes: list[dict[str, float]]
+    shapes: the parameters of each lobe, or all inputs of a standard's surface. error: over all samples, of what was
+    found from there with a part of the samples, before the best results were refined.
+    """
+
+    shapes: list[dict[str, Any]]
     error: float
 
 
@@ -35,7 +42,7 @@ class Fit:
     """
 
     model: str
-    brdf: MultiLobe
+    brdf: MultiLobe | Surface
     options: FitOptions
     error: float
     relative_error: float
@@ -45,14 +52,16 @@ class Fit:
 
     def as_json(self) -> dict[str, Any]:
         """Everything as plain values, for a file or for --json."""
+        lobes = self.brdf.lobes if isinstance(self.brdf, MultiLobe) else None
+        standard = STANDARDS.get(self.model)
         return {
             "model": self.model,
-            "lobes": len(self.brdf.lobes),
-            "source": family(self.model).source,
+            "lobes": len(lobes) if lobes else None,
+            "source": standard.source if standard else family(self.model).source,
             "loss": self.options.loss,
             "error": self.error,
             "relative_error": self.relative_error,
-            "parameters": [lobe.as_json() for lobe in self.brdf.lobes],
+            "parameters": [lobe.as_json() for lobe in lobes] if lobes else self.brdf.details()["surface"],
             "sampling": self.options.sampling,
             "samples": self.samples,
             "seed": self.options.seed,
@@ -72,7 +81,7 @@ def fit(brdf: Brdf, model: str, options: FitOptions | None = None, *, progress: 
 
 
 def fit_all(brdf: Brdf, options: FitOptions | None = None, *, progress: Progress | None = None) -> list[Fit]:
-    """Fits all models that can have the number of lobes asked for, and the diffuse ones; sorted, the best first."""
+    """Fits all sums of lobes that can have the number asked for, and the diffuse ones; sorted, the best first."""
     models = all_models((options or FitOptions()).lobes)
     return sorted(fit_models(brdf, models, options, progress=progress), key=lambda found: found.error)
 
@@ -85,11 +94,12 @@ def fit_models(
     Raises the same errors as `fit`.
     """
     options = options or FitOptions()
-    sums = [families_of(model, options.lobes, alone=len(models) == 1) for model in models]
+    if len(models) == 1:
+        check_model(models[0], options)
     samples = samples_of(brdf, options)
     steps = options.starts + REFINED
     found: list[Fit] = []
-    for model, families in zip(models, sums, strict=True):
+    for model in models:
 
         def advance(done: int) -> None:
             if progress:
@@ -97,16 +107,16 @@ def fit_models(
 
         started = time.perf_counter()
         with jit.limited():
-            search = Search(families, samples, options)
+            search = _search(model, samples, options, alone=len(models) == 1)
             best, ends = search.run(advance)
         found.append(
             Fit(
                 model,
-                MultiLobe(f"{brdf.name} ({model} fit)", search.lobes(best.places, best.albedos)),
+                search.material(f"{brdf.name} ({model} fit)", best),
                 options,
                 best.error,
                 best.error / search.whole.scale,
-                [Start([dict(o.shape) for o in search.lobes(end.start, end.albedos)], end.error) for end in ends],
+                [Start(search.start(end), end.error) for end in ends],
                 len(samples.wi),
                 time.perf_counter() - started,
             )
@@ -114,3 +124,9 @@ def fit_models(
     if progress:
         progress(1, 1)
     return found
+
+
+def _search(model: str, samples: Samples, options: FitOptions, *, alone: bool) -> Search | SurfaceSearch:
+    if model in STANDARDS:
+        return SurfaceSearch(STANDARDS[model], samples, options)
+    return Search(families_of(model, options.lobes, alone=alone), samples, options)

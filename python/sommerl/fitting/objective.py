@@ -20,12 +20,11 @@ from ..reflectance.arrays import Array, split
 from ..reflectance.samples import Samples
 from ..system.jit import drjit, float64
 from ..system.optional import optional
+from .loss import Domain
 from .options import Loss
 
 Matrix = NDArray[np.float64]
 
-LOG_EPSILON = 1e-3  # [1/sr]
-SMALLEST_ROOT = 1e-12  # below this, the cube root is taken to be constant, since its slope has no bound at 0
 UNSEEN = 1e-12  # a lobe that is darker than this share of the brightest one, in all samples, gets the albedo 0
 RANK = 1e-13  # eigenvalues below this share of the largest are taken for rounding errors
 HEAVY = 1e6  # the weight of an equation that has to hold exactly
@@ -52,17 +51,17 @@ class Objective:
         self._float: Any = float64()
         self.families = families
         self.parameters = [p for family in families for p in family.parameters]
-        self.linear = loss in ("l2", "cosine-l2")
-        self._loss = loss
+        self._domain = Domain(loss)
+        self.linear = self._domain.linear
         wi, wo = (tuple(self._float(component.copy()) for component in split(w)) for w in (samples.wi, samples.wo))
         self._angles = a = Angles(wi, wo)
         self._dr.eval(
             a.cos_h, a.sin_h, a.tan2_h, a.theta_h, a.cos_d, a.along
         )  # computed once, not again for every lobe
         self._owner = [lobe for lobe, family in enumerate(families) for _ in family.parameters]
-        self._weight = self._float(1.0) if loss == "l2" else a.cos_i
+        self._weight = self._domain.weight(a.cos_i)
         measured = [self._float(channel.copy()) * self._weight for channel in samples.f_r.T]
-        self._target = [self._mapped(m) for m in measured]
+        self._target = [self._domain.mapped(m) for m in measured]
         self._dr.eval(self._target)
         targets = np.stack([t.numpy() for t in self._target])
         self._squared = float((targets**2).sum())
@@ -108,8 +107,8 @@ class Objective:
         lobes = len(self.families)
         columns: list[Matrix] = []
         for target in self._target:
-            slope = self._slope_at(target)
-            weighted = np.concatenate([self._rows[:lobes], [self._unmapped(target).numpy()]]) * slope.numpy()
+            slope = self._domain.slope(self._domain.unmapped(target))
+            weighted = np.concatenate([self._rows[:lobes], [self._domain.unmapped(target).numpy()]]) * slope.numpy()
             moments = weighted @ weighted.T
             columns.append(least_squares(moments[:lobes, :lobes], moments[:lobes, -1:], most))
         return np.concatenate(columns, axis=1)
@@ -118,7 +117,7 @@ class Objective:
         """The root mean square of the differences. They are added up one by one, so that it is exact even if samples
         and model agree to more than seven digits, where the distance has only rounding errors left."""
         modelled = self._modelled(places, albedos)
-        differences = [self._mapped(m) - t for m, t in zip(modelled, self._target, strict=True)]
+        differences = [self._domain.mapped(m) - t for m, t in zip(modelled, self._target, strict=True)]
         return sqrt(sum(float((d.numpy() ** 2).sum()) for d in differences) / self.count)
 
     def _linear(self, moments: Matrix, albedos: Matrix) -> Value:
@@ -133,8 +132,8 @@ class Objective:
     def _non_linear(self, places: NDArray[np.float64], albedos: Matrix) -> Value:
         modelled = self._modelled(places, albedos)
         squared = 0.0
-        differences = [self._mapped(m) - t for m, t in zip(modelled, self._target, strict=True)]
-        seeds = [d * self._slope(m) for d, m in zip(differences, modelled, strict=True)]
+        differences = [self._domain.mapped(m) - t for m, t in zip(modelled, self._target, strict=True)]
+        seeds = [d * self._domain.slope(m) for d, m in zip(differences, modelled, strict=True)]
         self._dr.eval(differences, seeds)
         for channel, (difference, seed) in enumerate(zip(differences, seeds, strict=True)):
             found = difference.numpy()
@@ -178,41 +177,6 @@ class Objective:
             if values is not None:
                 self._rows[row] = values.numpy()
         return found
-
-    def _mapped(self, f_r: Array) -> Array:
-        """Weighted f_r in the domain of the loss."""
-        match self._loss:
-            case "log":
-                return self._dr.log(1.0 + f_r / LOG_EPSILON)
-            case "cube-root":
-                return self._dr.cbrt(self._dr.maximum(f_r, SMALLEST_ROOT))
-            case _:
-                return f_r
-
-    def _unmapped(self, mapped: Array) -> Array:
-        """The inverse of `_mapped`."""
-        match self._loss:
-            case "log":
-                return LOG_EPSILON * (self._dr.exp(mapped) - 1.0)
-            case "cube-root":
-                return mapped * mapped * mapped
-            case _:
-                return mapped
-
-    def _slope(self, f_r: Array) -> Array:
-        """The derivative of `_mapped`."""
-        match self._loss:
-            case "log":
-                return 1.0 / (LOG_EPSILON + f_r)
-            case "cube-root":
-                root = self._mapped(f_r)
-                return self._dr.select(f_r > SMALLEST_ROOT, 1.0 / (3.0 * root * root), 0.0)
-            case _:
-                return 0.0 * f_r + 1.0
-
-    def _slope_at(self, mapped: Array) -> Array:
-        """The same, for a value that is already in the domain of the loss."""
-        return self._slope(self._unmapped(mapped))
 
 
 def least_squares(gram: Matrix, data: Matrix, most: float | None) -> Matrix:

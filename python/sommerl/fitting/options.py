@@ -8,6 +8,7 @@ from typing import Literal, get_args
 from ..models.family import Family
 from ..models.lambertian import LAMBERTIAN
 from ..models.multi_lobe import FAMILIES
+from ..models.standards import STANDARDS
 from ..system.errors import OptionError
 from ..system.near import did_you_mean
 
@@ -61,9 +62,19 @@ class FitOptions:
 def family(model: str) -> Family:
     """The family of a name. Raises OptionError, which lists all names, if there is none of that name."""
     if model not in FAMILIES:
-        hint = did_you_mean(model, FAMILIES)
-        raise OptionError(f"model: expected {', '.join(FAMILIES)} or all, found {model}{hint}")
+        names = (*FAMILIES, *STANDARDS)
+        raise OptionError(f"model: expected {', '.join(names)} or all, found {model}{did_you_mean(model, names)}")
     return FAMILIES[model]
+
+
+def check_model(model: str, options: FitOptions) -> None:
+    """Raises OptionError for an unknown model, and for options that it cannot have."""
+    if model not in STANDARDS:
+        families_of(model, options.lobes)
+    elif options.lobes is not None:
+        raise OptionError(f"lobes: {model} has layers of its own and no number of lobes, found {options.lobes}")
+    elif options.conserve_energy:
+        raise OptionError(f"conserve_energy: expected a sum of lobes, found {model}, whose inputs its standard bounds")
 
 
 def families_of(model: str, lobes: int | None, *, alone: bool = True) -> tuple[Family, ...]:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..models.family import Family
-from ..models.multi_lobe import Lobe
+from ..models.multi_lobe import Lobe, MultiLobe
 from ..reflectance.samples import Samples
 from ..system.optional import optional
 from .objective import Matrix, Objective
@@ -73,6 +73,13 @@ class Search:
             advance(len(ends) + len(refined))
         return min([*refined, *ends], key=lambda end: end.error), ends
 
+    def material(self, name: str, end: End) -> MultiLobe:
+        return MultiLobe(name, self.lobes(end.places, end.albedos))
+
+    def start(self, end: End) -> list[dict[str, float]]:
+        """Where a search began: the shapes of all lobes."""
+        return [dict(lobe.shape) for lobe in self.lobes(end.start, end.albedos)]
+
     def lobes(self, places: Vector, albedos: Matrix) -> list[Lobe]:
         """Lobes with these shapes and albedos, the widest first."""
         found: list[Lobe] = []
@@ -124,7 +131,7 @@ class Search:
             return found.distance / unit, found.by_places / unit
 
         if len(places):
-            places = _slsqp(value, places, [(0.0, 1.0)] * len(places), iterations)
+            places = slsqp(value, places, [(0.0, 1.0)] * len(places), iterations)
         return places, objective.solved(places, self._most)[0]
 
     def _descend_all(
@@ -145,11 +152,11 @@ class Search:
             row[:, channel] = size[:, channel]
             sums.append(np.append(np.zeros(count), row))
         bounds: list[tuple[float, float | None]] = [*[(0.0, 1.0)] * count, *[(0.0, None)] * albedos.size]
-        x = _slsqp(value, np.append(places, albedos / size), bounds, iterations, sums)
+        x = slsqp(value, np.append(places, albedos / size), bounds, iterations, sums)
         return x[:count], x[count:].reshape(shape) * size
 
 
-def _slsqp(
+def slsqp(
     value: Callable[[Vector], tuple[float, Vector]],
     start: Vector,
     bounds: Sequence[tuple[float, float | None]],

@@ -1,6 +1,7 @@
 """Files of fits, as `sommerl fit` writes them: JSON, an object with "sommerl_fits": 1, the name of the "material", and
-its "fits": of each the "model", the "parameters" of its lobes ("family", "albedo" and the numbers of its shape) and
-how it came about. A fit is a material: FILE.json:MODEL; without a name, the first.
+its "fits": of each the "model", the "parameters" of its lobes ("family", "albedo" and the numbers of its shape), or of
+a standard's surface ("model" and its inputs), and how it came about. A fit is a material: FILE.json:MODEL; without a
+name, the first.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from ..models.multi_lobe import FAMILIES, Lobe, MultiLobe
+from ..models.standard import Surface
+from ..models.standards import STANDARDS
 from ..system import door
 from ..system.errors import FormatError, MaterialError
 from ..system.files import atomic_write
@@ -37,21 +40,23 @@ def write(path: Path, material: str, fits: Sequence[Mapping[str, Any]]) -> None:
         out.write(json.dumps(content(material, fits), indent=1, allow_nan=False).encode() + b"\n")
 
 
-def read(path: str | Path, member: str = "") -> MultiLobe:
+def read(path: str | Path, member: str = "") -> MultiLobe | Surface:
     """One of the fits in a file. member: its model; the first if empty. Raises FormatError."""
     return parse(Path(path), door.read(path, LARGEST_FILE), member)
 
 
-def parse(path: Path, data: bytes, member: str = "") -> MultiLobe:
+def parse(path: Path, data: bytes, member: str = "") -> MultiLobe | Surface:
     """As `read`, from the file's bytes; the path is for names and messages alone."""
     top, fits, models = _models(path, data)
     material = _name(path, "material", top.get("material"))
     if member and member not in models:
         raise FormatError(f"{path}: expected one of {', '.join(models[:20])}, found {member}")
     at = models.index(member) if member else 0
+    name, parameters = f"{material} ({models[at]} fit)", fits[at].get("parameters")
     try:
-        lobes = [_lobe(path, lobe) for lobe in _sequence(path, "parameters", fits[at].get("parameters"))]
-        return MultiLobe(f"{material} ({models[at]} fit)", lobes)
+        if isinstance(parameters, dict):
+            return _surface(path, name, parameters)
+        return MultiLobe(name, [_lobe(path, lobe) for lobe in _sequence(path, "parameters", parameters)])
     except MaterialError as error:
         raise FormatError(f"{path}: {error}") from error
 
@@ -76,6 +81,26 @@ def _models(path: Path, data: bytes) -> tuple[dict[str, Any], list[dict[str, Any
     if not fits:
         raise FormatError(f"{path}: fits: expected one or more, found none")
     return top, fits, models
+
+
+def _surface(path: Path, name: str, found: Any) -> Surface:
+    inputs = _mapping(path, "parameters", found)
+    model = STANDARDS.get(str(inputs.pop("model", None)))
+    if model is None:
+        raise FormatError(f"{path}: parameters: expected a model of {', '.join(STANDARDS)}, found another or none")
+    values = {_name(path, model.name, key): _numbers(path, model.name, value) for key, value in inputs.items()}
+    for key, value in values.items():
+        if key in model.by_key and model.by_key[key].colour != isinstance(value, tuple):
+            what = "three numbers" if model.by_key[key].colour else "a number"
+            raise FormatError(f"{path}: {model.name}: {key}: expected {what}, found something else")
+    return Surface(name, model, values)
+
+
+def _numbers(path: Path, field: str, value: Any) -> float | tuple[float, ...]:
+    """A number, or a list of them."""
+    if isinstance(value, list):
+        return tuple(_number(path, field, each) for each in _sequence(path, field, value))
+    return _number(path, field, value)
 
 
 def _lobe(path: Path, found: Any) -> Lobe:

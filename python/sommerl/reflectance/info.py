@@ -29,8 +29,9 @@ class Info:
     nodes: their number. domain: in which values are stored and blended, "linear" or "cube-root". bytes_paper: the size
     as the paper counts it. terms: lobes and terms of a factored BRDF. bytes_memory: what a lookup reads. options,
     metrics: how it was compressed, and how well. source_sha256, made_from: see `origin.Source`. lobes: of a formula.
-    reciprocal, signed, mirrored: see `Brdf`. cells_clamped, energy_clamped, energy_averaged: see `Counts`.
-    measured_against: what `metrics` compare with. facts: what a reader reported.
+    surface: the model of a standard, and its inputs. reciprocal, signed, mirrored: see `Brdf`. cells_clamped,
+    energy_clamped, energy_averaged: see `Counts`. measured_against: what `metrics` compare with. facts: what a reader
+    reported.
     """
 
     kind: str
@@ -50,6 +51,7 @@ class Info:
     metrics: Mapping[str, Any] | None = None
     source_sha256: str | None = None
     lobes: list[dict[str, Any]] | None = None
+    surface: dict[str, Any] | None = None
     cells_clamped: int | None = None
     energy_clamped: float | None = None
     energy_averaged: float | None = None
