@@ -95,3 +95,38 @@ def test_black_and_undefined_tables(capsys, tmp_path):
         status, out, err = run(capsys, "fit", path)
         assert (status, out) == (1, "")
         assert err == f"error: {path}: expected a positive, finite reflectance above the horizon, found none\n"
+
+
+@pytest.fixture
+def no_file_beside(monkeypatch):
+    """Compressing takes seconds, and is tested elsewhere."""
+    monkeypatch.setattr(command, "compress", lambda brdf, **_: (brdf, None))
+
+
+def test_a_standard_and_what_is_written_of_it(capsys, tmp_path, no_file_beside):
+    quick = ["red-fabric", "--samples", "1000", "--starts", "1", "--model"]
+    result = run_json(capsys, "fit", *quick, "openpbr", "-o", tmp_path / "x.json")
+    (fit,) = result["fits"]
+    assert (fit["model"], fit["lobes"], fit["parameters"]["model"]) == ("openpbr", None, "openpbr")
+    assert fit["blender"]["Base Color"][:3] == pytest.approx(fit["parameters"]["base_color"], rel=1e-5)
+    assert fit["psnr_soft_db"] > 25
+    assert fit["smrl"] == {"target_size": 2700, "psnr_soft_db": None}  # the same material: no difference
+    info = run_json(capsys, "info", tmp_path / "x.json")
+    assert info["surface"] == fit["parameters"]
+    status, out, _ = run(capsys, "info", tmp_path / "x.json")
+    assert status == 0
+    assert "base_color" in out
+    for name, model, head in (("x.mtlx", "openpbr", b"<?xml"), ("x.gltf", "gltf", b"{")):
+        status, out, err = run(capsys, "fit", *quick, model, "-o", tmp_path / name)
+        assert (status, err) == (0, "")
+        assert "PSNR in soft light" in out
+        assert (tmp_path / name).read_bytes().startswith(head)
+    materials = json.loads((tmp_path / "x.gltf").read_text())["materials"]
+    assert set(materials[0]["extensions"]) == {f"KHR_materials_{x}" for x in ("specular", "clearcoat", "sheen")}
+
+
+def test_files_of_standards_hold_their_own_model_alone(capsys, tmp_path):
+    status, _, err = run(capsys, "fit", "red-fabric", "--model", "ggx", "-o", tmp_path / "x.mtlx")
+    assert status == 2
+    assert err == f"error: {tmp_path}/x.mtlx: expected --model openpbr, which .mtlx holds, found ggx\n"
+    assert not (tmp_path / "x.mtlx").exists()

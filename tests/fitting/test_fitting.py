@@ -10,11 +10,13 @@ from sommerl.fitting import FitOptions, fit, fit_all
 from sommerl.fitting.data import samples_of
 from sommerl.fitting.search import Search
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
+from sommerl.models.standards import STANDARDS
 from sommerl.system.errors import MaterialError, OptionError
 
 COARSE = Lattice(24, 20, 24)
 SPECULAR = [name for name, family in FAMILIES.items() if not family.diffuse]
 FEW = FitOptions(samples=5000, starts=6)
+NAMES = (*FAMILIES, *STANDARDS)
 
 
 def known(model, specular, seed=0):
@@ -208,9 +210,9 @@ def test_a_constant_is_lambertian():
 @pytest.mark.parametrize(
     ("model", "lobes", "message"),
     [
-        ("wardd", None, f"model: expected {', '.join(FAMILIES)} or all, found wardd; did you mean ward?"),
-        ("GGX", None, f"model: expected {', '.join(FAMILIES)} or all, found GGX; did you mean ggx?"),
-        ("xyz", None, f"model: expected {', '.join(FAMILIES)} or all, found xyz"),
+        ("wardd", None, f"model: expected {', '.join(NAMES)} or all, found wardd; did you mean ward?"),
+        ("GGX", None, f"model: expected {', '.join(NAMES)} or all, found GGX; did you mean ggx?"),
+        ("xyz", None, f"model: expected {', '.join(NAMES)} or all, found xyz"),
         ("ward", 1, "lobes: expected 2 to 4 of ward, its Lambertian base included, found 1"),
         ("lambertian", 2, "lobes: lambertian is a base itself and has 1 lobe, found 2"),
     ],

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from sommerl import load
 from sommerl.formats import fits
 from sommerl.models.multi_lobe import FAMILIES, Lobe, MultiLobe
+from sommerl.models.standard import Surface
+from sommerl.models.standards import STANDARDS
 from sommerl.system.errors import FormatError
 
 A, B = random_directions(200, 1), random_directions(200, 2)
@@ -151,3 +153,51 @@ def test_too_deep_and_too_large(tmp_path):
         out.write(b'{"sommerl_fits": 1')
         out.truncate(fits.LARGEST_FILE + 1)
     assert complaint(load, path) == f"{path}: expected at most 16777216 bytes, found 16777217"
+
+
+SURFACE = {
+    "model": "gltf",
+    "baseColorFactor": [0.5, 0.25, 0.125],
+    "metallicFactor": 0.25,
+    "roughnessFactor": 0.3,
+    "specularFactor": 1.0,
+    "specularColorFactor": [1.0, 2.0, 1.0],
+    "clearcoatFactor": 0.5,
+    "clearcoatRoughnessFactor": 0.1,
+    "sheenColorFactor": [0.0, 0.0, 0.1],
+    "sheenRoughnessFactor": 0.5,
+}
+
+
+def test_a_standards_surface_is_read_as_the_material_that_it_is(tmp_path):
+    fits.write(tmp_path / "x.json", "paint", [{"model": "gltf", "parameters": SURFACE}])
+    found = load(tmp_path / "x.json")
+    values = {key: value for key, value in SURFACE.items() if key != "model"}
+    check_same(found, Surface("", STANDARDS["gltf"], values))
+    assert found.info().surface == SURFACE
+    must_fail(check_same, found, Surface("", STANDARDS["gltf"], values | {"metallicFactor": 0.3}))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"model": "x"}, "parameters: expected a model of openpbr, principled, gltf, found another or none"),
+        ({"model": ["gltf"]}, "parameters: expected a model of openpbr"),
+        ({"metallicFactor": 2}, "gltf: metallicFactor: expected a number from 0 to 1, found 2"),
+        ({"metallicFactor": float("nan")}, "gltf: metallicFactor: expected a number from 0 to 1, found nan"),
+        ({"metallicFactor": [1, 1, 1]}, "gltf: metallicFactor: expected a number, found something else"),
+        ({"baseColorFactor": 1}, "gltf: baseColorFactor: expected three numbers, found something else"),
+        ({"baseColorFactor": [1, 1]}, "gltf: baseColorFactor: expected three numbers from 0 to 1, found (1.0, 1.0)"),
+        ({"baseColorFactor": [1, 1, "x"]}, "gltf: expected numbers, found something else"),
+        ({"baseColorFactor": {}}, "gltf: expected numbers, found something else"),
+        ({"x": 1}, "gltf: expected inputs ["),
+    ],
+)
+def test_other_inputs(tmp_path, change, message):
+    fits.write(tmp_path / "x.json", "paint", [{"model": "gltf", "parameters": SURFACE}])
+    found = json.loads((tmp_path / "x.json").read_text())
+    found["fits"][0]["parameters"] |= change
+    (tmp_path / "x.json").write_text(json.dumps(found))
+    with pytest.raises(FormatError) as caught:
+        load(tmp_path / "x.json")
+    assert message in str(caught.value)

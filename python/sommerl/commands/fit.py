@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 from .. import plots
@@ -26,6 +27,7 @@ from ..system.errors import OptionError
 from . import answers, console
 from .arguments import Material, WritingArguments, library_options, named_as_typed, option, positional
 from .checks import check_output
+from .outcome import finite
 from .parser import add_command
 from .rows import lobe_text, surface_text
 
@@ -119,7 +121,7 @@ def fit(options: FitArguments) -> dict[str, Any]:
     if options.output and kind in standard_files.FILES and isinstance(found[0].brdf, Surface):
         standard_files.write(options.output, found[0].brdf)
     elif options.output:
-        fits.write(options.output, brdf.name, result["fits"])
+        fits.write(options.output, brdf.name, finite(result["fits"]))
     if not options.json:
         print_fits(f"{options.material}: {chosen.loss} error of fits", result["fits"], found)
         if files:
@@ -184,4 +186,5 @@ def _families() -> str:
 
 def _standards() -> str:
     """All standards' models, with what they fit."""
-    return "\n".join(f"  {name:20}{', '.join(model.by_key)}" for name, model in STANDARDS.items())
+    rows = (f"  {name:20}{', '.join(model.by_key)}" for name, model in STANDARDS.items())
+    return "\n".join(fill(row, 80, subsequent_indent=22 * " ") for row in rows)

@@ -84,15 +84,15 @@ def fail(message: str, status: int, known: Mapping[str, Any] | None = None, *, a
 
 
 def _print_json(answer: Mapping[str, Any]) -> None:
-    print(json.dumps(_finite(answer), indent=2))
+    print(json.dumps(finite(answer), indent=2))
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
     """The same, with null for the numbers that JSON lacks (the PSNR of identical images)."""
     if isinstance(value, Mapping):
-        return {key: _finite(item) for key, item in value.items()}  # pyright: ignore[reportUnknownVariableType]
+        return {key: finite(item) for key, item in value.items()}  # pyright: ignore[reportUnknownVariableType]
     if isinstance(value, list):
-        return [_finite(item) for item in value]  # pyright: ignore[reportUnknownVariableType]
+        return [finite(item) for item in value]  # pyright: ignore[reportUnknownVariableType]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

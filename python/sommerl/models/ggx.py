@@ -29,6 +29,16 @@ def visibility(a: Angles, alpha: Array) -> Array:
     return 0.5 / (a.cos_o * slanted(a.cos_i) + a.cos_i * slanted(a.cos_o))
 
 
+def separable_visibility(a: Angles, alpha: Array) -> Array:
+    """The same, with masking and shadowing independent of each other: the product of two of Heitz's Eq. 43."""
+    f, alpha2 = ops(a.cos_i), alpha * alpha
+
+    def unmasked(cosine: Array) -> Array:
+        return cosine + f.sqrt(alpha2 + (1.0 - alpha2) * (cosine * cosine))
+
+    return 1.0 / (unmasked(a.cos_i) * unmasked(a.cos_o))
+
+
 def lobe(a: Angles, alpha: Array, f0: Array) -> Array:
     """f_r [1/sr] = D F G / (4 cos θ_i cos θ_o)."""
     return distribution(a, alpha) * visibility(a, alpha) * fresnel(a.cos_d, f0)

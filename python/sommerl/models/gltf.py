@@ -33,7 +33,7 @@ def f_r(a: Angles, v: Values) -> Triple:
         reflected.append(f0 + (1.0 - f0) * away)
     below = 1.0 - specular * _largest(reflected)
 
-    sheen, dimming = _sheen(a, v["sheenRoughnessFactor"])
+    fibres, dimming = sheen(a, v["sheenRoughnessFactor"])
     under_sheen = 1.0 - dimming * _largest(v["sheenColorFactor"])
     coat = v["clearcoatFactor"] * (F0 + (1.0 - F0) * fifth(1.0 - a.cos_o))
     facets_c = _facets(a, v["clearcoatRoughnessFactor"])
@@ -41,17 +41,15 @@ def f_r(a: Angles, v: Values) -> Triple:
     for k in range(3):
         plastic = below * base[k] / PI + specular * reflected[k] * facets
         metal = facets * (base[k] + (1.0 - base[k]) * away)
-        material = v["sheenColorFactor"][k] * sheen + under_sheen * mix(plastic, metal, metallic)
+        material = v["sheenColorFactor"][k] * fibres + under_sheen * mix(plastic, metal, metallic)
         colour.append(mix(material, facets_c, coat))
     return colour[0], colour[1], colour[2]
 
 
 def _facets(a: Angles, roughness: Array) -> Array:
-    """D G / (4 cos θ_i cos θ_o) of GGX, with masking and shadowing independent of each other."""
-    f, alpha = ops(a.cos_i), roughness * roughness
-    alpha2 = alpha * alpha
-    slanted = [cosine + f.sqrt(alpha2 + (1.0 - alpha2) * (cosine * cosine)) for cosine in (a.cos_i, a.cos_o)]
-    return ggx.distribution(a, alpha) / (slanted[0] * slanted[1])
+    """D G / (4 cos θ_i cos θ_o) of GGX."""
+    alpha = roughness * roughness
+    return ggx.distribution(a, alpha) * ggx.separable_visibility(a, alpha)
 
 
 def _largest(colour: tuple[Array, ...] | list[Array]) -> Array:
@@ -59,7 +57,7 @@ def _largest(colour: tuple[Array, ...] | list[Array]) -> Array:
     return f.maximum(f.maximum(colour[0], colour[1]), colour[2])
 
 
-def _sheen(a: Angles, roughness: Array) -> tuple[Array, Array]:
+def sheen(a: Angles, roughness: Array) -> tuple[Array, Array]:
     """Estevez & Kulla's sheen, and its directional albedo."""
     f, alpha = ops(a.cos_i), roughness * roughness
     lobe = (2.0 + 1.0 / alpha) * f.power(a.sin_h, 1.0 / alpha) / (2.0 * PI)

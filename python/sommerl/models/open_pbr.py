@@ -1,8 +1,8 @@
 """OpenPBR: the surface model of the Academy Software Foundation, for opaque materials.
 
 The standard: Andersson, Brinck, Langlands, Portsmouth et al., "OpenPBR Surface" 1.1, 2024. What it leaves to
-implementations (how layers keep energy) is as in its reference implementation in MaterialX 1.39.5: each specular lobe is
-brightened by what single scattering loses (Turquin 2019, "Practical Multiple Scattering Compensation for Microfacet
+implementations (how layers keep energy) is as in its reference implementation, in MaterialX 1.39.5: each specular lobe
+is brightened by what single scattering loses (Turquin 2019, "Practical Multiple Scattering Compensation for Microfacet
 Models"), and what lies below a layer is darkened by the layer's directional albedo for the viewer. The layers are fuzz
 over coat over a mixture of metal and of a dielectric over a diffuse base. Transmission, subsurface scattering, thin
 films, emission and anisotropy have the weight 0.

@@ -22,7 +22,7 @@ def f_r(a: Angles, v: Values) -> Triple:
     f = ops(a.cos_i)
     base, metallic, roughness = v["base_color"], v["metallic"], v["roughness"]
     alpha = f.maximum(roughness * roughness, 0.001)
-    facets = ggx.distribution(a, alpha) * ggx.visibility(a, alpha)
+    facets = ggx.distribution(a, alpha) * ggx.separable_visibility(a, alpha)
     root = f.sqrt(0.08 * v["specular"])
     clear = dielectric(a.cos_d, (1.0 + root) / (1.0 - root))
     away_d, away_i, away_o = (fifth(1.0 - cosine) for cosine in (a.cos_d, a.cos_i, a.cos_o))
