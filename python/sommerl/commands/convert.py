@@ -11,7 +11,7 @@ from typing import Any
 from ..compression.compact.search import CompactOptions
 from ..compression.material import SomManBrdf
 from ..compression.paper.options import TrainOptions
-from ..formats import registry, rgl, rgl_export, smrl, source_code
+from ..formats import buffers, registry, rgl, rgl_export, smrl, source_code, texture
 from ..formats.format import Format
 from ..formats.load import load
 from ..formats.scattered import ScatteredBrdf
@@ -21,6 +21,7 @@ from ..reflectance.brdf import Brdf
 from ..reflectance.info import Counts
 from ..reflectance.reciprocal import reciprocal
 from ..reflectance.table import BrdfTable
+from ..render.judge import Judge
 from ..system.errors import OptionError
 from . import answers, console
 from .arguments import (
@@ -38,7 +39,7 @@ from .compress import compact_one, compress_one, fitted, trained
 from .inputs import expanded, is_several, read_all
 from .laboratory import ReportArguments, check_samples, reported, warn_of_samples
 from .parser import add_command
-from .rows import changed_rows, fact_rows
+from .rows import changed_rows, fact_rows, judged_rows
 
 # The options that what is written depends on.
 OF_CONTENT = (
@@ -124,10 +125,14 @@ def converted(brdf: Brdf, kind: Format, options: ConvertArguments) -> dict[str, 
         counts = Counts() if kind.names_source else written.counts
         result = {"input": options.input, "name": written.name, "output": str(output), "bytes_disk": size}
         result |= asdict(counts)
+        metrics = Judge(brdf).metrics(written) if kind is texture.FORMAT else {}
+        result |= {"metrics": metrics} if metrics else {}
         if not options.json:
             written_as = "through a pipe" if size is None else console.size(size)
             console.say(f"{written.name} → {output} ({written_as})")
             for name, value in changed_rows(counts).items():
+                console.say(f"  {name}: {value}")
+            for name, value in judged_rows(metrics).items():
                 console.say(f"  {name}: {value}")
     if not options.json:
         _print_report(report | {"facts": {}} if "epochs" in result else report)
@@ -203,6 +208,9 @@ def checked(options: ConvertArguments) -> Format:
         if not (kind and kind.compressed):
             raise OptionError(f"--target-size: expected an output that is compressed, found {options.output}")
     check_output(options.output, registry.extensions(registry.writable()), *options.inputs)
+    for each in (texture, buffers):
+        for path in each.beside(options.output) if kind is each.FORMAT else ():
+            check_output(path, (path.suffix,), *options.inputs)
     assert kind  # or the check has said which ones there are
     return kind
 

@@ -9,6 +9,7 @@ from ..system.errors import FormatError
 from . import (
     alta,
     astm,
+    buffers,
     cornell,
     fbrdf,
     fits,
@@ -22,6 +23,7 @@ from . import (
     smrl,
     smrlib,
     source_code,
+    texture,
     xompt,
     zemax,
 )
@@ -46,6 +48,8 @@ FORMATS: list[Format] = [
     nbrdf.FORMAT,
     fits.FORMAT,
     source_code.FORMAT,
+    texture.FORMAT,
+    buffers.FORMAT,
     scene.FORMAT,
 ]
 

@@ -51,6 +51,7 @@ def material_x(surface: Surface) -> bytes:
     name = re.sub(r"\W+", "_", surface.name, flags=re.ASCII).strip("_") or "material"
     name = f"_{name}" if name[0].isdigit() else name
     root = xml.Element("materialx", version="1.39", colorspace="lin_rec709")
+    root.append(xml.Comment(" Written by Sommerl "))
     shader = xml.SubElement(root, "open_pbr_surface", name=f"{name}_surface", type="surfaceshader")
     for key, value in surface.values.items():
         kind = "color3" if surface.model.by_key[key].colour else "float"

@@ -50,6 +50,11 @@ MARKS: tuple[tuple[bytes, bytes], ...] = (
     (b"<!-- ", rb"\A<!-- Written by Sommerl -->"),
     (b"# ", rb"\A# Written by Sommerl: residuals"),
     (b"<svg ", rb"<!-- Written by Sommerl -->"),
+    (b"<?xml ", rb"<!-- Written by Sommerl -->"),
+    (b"{", rb'\A\{\s*"asset": \{\s*"version": "2\.0",\s*"generator": "Sommerl'),
+    (b"{", rb'\A\{\s*"sommerl_(texture|buffers)"'),
+    (b"\xabKTX 20", rb"KTXwriter\0Sommerl"),
+    (b"", rb"Written by Sommerl\Z"),  # arrays for buffers, which have no head
     (b"RIFF", rb"Sommerl"),  # WebP, whose metadata are at its end
 )
 WITHIN = 2**14  # bytes at the beginning and at the end of a file in which its mark is searched for

@@ -20,7 +20,7 @@ from ...reflectance.brdf import Brdf
 from ...sampling import half_vector
 from ...system.errors import FormatError
 from ...system.files import atomic_write
-from .arrays import of_words
+from .arrays import Array, of_words
 from .head import head_values
 from .language import LANGUAGES, Language
 from .parts import Parts, of_cells, of_nodes
@@ -74,13 +74,28 @@ def source(material: Brdf, language: Language, name: str, settings: Settings = S
 
     Raises FormatError for a material that is not compressed.
     """
+    parts, compressed = _parts(material)
+    return _whole(parts, [compressed], language, name, settings, numbered=False)
+
+
+def arrays_of(material: Brdf) -> list[Array]:
+    """All arrays that the source code of a compressed material reads. Raises FormatError as `source` does."""
+    parts, compressed = _parts(material)
+    return [*parts.arrays, of_samplers([compressed])]
+
+
+def of_samplers(materials: Sequence[SomManBrdf]) -> Array:
+    """The tables of the samplers, one behind the other."""
+    fitted = [half_vector.HalfVectorSampler.fitted(each).table.reshape(-1) for each in materials]
+    return of_words("sampler", np.concatenate(fitted))
+
+
+def _parts(material: Brdf) -> tuple[Parts, SomManBrdf]:
     if not isinstance(material, SomManBrdf):
         raise FormatError(f"{material.name}: expected a compressed material, with a palette, found a {material.kind}")
     if material.grid is None:
-        parts = of_nodes([material], numbered=False)
-    else:
-        parts = of_cells(material.grid, material.interpolation, material.buffers()["index"], material.lut)
-    return _whole(parts, [material], language, name, settings, numbered=False)
+        return of_nodes([material], numbered=False), material
+    return of_cells(material.grid, material.interpolation, material.buffers()["index"], material.lut), material
 
 
 def atlas_source(materials: Sequence[Brdf], language: Language, name: str, settings: Settings = Settings()) -> str:
@@ -117,8 +132,7 @@ def _whole(
         template("eval", FOLD=parts.fold, LOOKUP=parts.lookup, IN_RANGE=in_range),
     ]
     if settings.sampler:
-        fitted = [half_vector.HalfVectorSampler.fitted(each).table.reshape(-1) for each in materials]
-        arrays.append(of_words("sampler", np.concatenate(fitted)))
+        arrays.append(of_samplers(materials))
         blocks.append(template("sampling", IN_RANGE=in_range))
     head = template(
         "head",
