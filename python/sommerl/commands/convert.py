@@ -132,7 +132,7 @@ def converted(brdf: Brdf, kind: Format, options: ConvertArguments) -> dict[str, 
             console.say(f"{written.name} → {output} ({written_as})")
             for name, value in changed_rows(counts).items():
                 console.say(f"  {name}: {value}")
-            for name, value in judged_rows(metrics).items():
+            for name, value in judged_rows(metrics).items() if metrics else ():
                 console.say(f"  {name}: {value}")
     if not options.json:
         _print_report(report | {"facts": {}} if "epochs" in result else report)
