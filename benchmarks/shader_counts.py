@@ -122,7 +122,7 @@ def counted(folder: Path, body: str) -> Counter[str]:
     run("spirv-opt", "--inline-entry-points-exhaustive", "-O", binary, "-o", best)
     # Loops are unrolled where they say so.
     (folder / "x.spvasm").write_text(re.sub(r"(OpLoopMerge .*) None", r"\1 Unroll", run("spirv-dis", best)))
-    run("spirv-as", "--preserve-numeric-ids", folder / "x.spvasm", "-o", binary)
+    run("spirv-as", "--target-env", "spv1.0", "--preserve-numeric-ids", folder / "x.spvasm", "-o", binary)
     run("spirv-opt", "--loop-unroll", "-O", binary, "-o", best)
     listed = run("spirv-dis", "--no-header", best)
     whole = listed[listed.index("OpFunction ") :]
