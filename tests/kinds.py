@@ -8,9 +8,12 @@ from sampled import HANDED, NODES, lobe
 
 from sommerl import BrdfTable, SomManBrdf, builtin
 from sommerl.compression.compact.fitted_table import FittedTable
+from sommerl.formats import texture
 from sommerl.formats.rgl import RglBrdf
 from sommerl.models.multi_lobe import FAMILIES, MultiLobe
 from sommerl.models.nbrdf import WEIGHTS, NeuralBrdf
+from sommerl.models.standard import Surface
+from sommerl.models.standards import STANDARDS
 from sommerl.reflectance.grid import GridBrdf
 
 RNG = np.random.default_rng(1)
@@ -38,6 +41,10 @@ def one_lobe(name):
     return MultiLobe(name, [lobe(name, (0.3, 0.2, 0.1), **{p.name: p.start for p in family.parameters})])
 
 
+def surface(model):
+    return Surface(model.name, model, model.by_name([float(chosen.start) for chosen in model.places]))
+
+
 KINDS = {
     "table-nearest": BrdfTable(VALUES, SMALL, interpolation="nearest", name="table"),
     "table-trilinear": BrdfTable(VALUES, SMALL, name="table"),
@@ -53,5 +60,7 @@ KINDS = {
     "neural": NeuralBrdf.from_flat(0.3 * RNG.standard_normal(WEIGHTS), name="neural"),
     "sgd": builtin("red-fabric"),
     "factored": made(),
+    "texture": texture.of(compact_material(NODES)),
     **{name: one_lobe(name) for name in FAMILIES},
+    **{name: surface(model) for name, model in STANDARDS.items()},
 }

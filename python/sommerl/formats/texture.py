@@ -87,7 +87,7 @@ class TextureBrdf(Brdf):
         return "trilinear"
 
     def buffers(self) -> dict[str, NDArray[Any]]:
-        return {"texels": self.values.astype(np.float32).reshape(-1), "scale": np.array([self.scale])}
+        return {"texels": self.values.astype(np.float32).reshape(-1), "scale": np.array(self.scale)}
 
     def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
         f = ops(wi[0])

@@ -106,9 +106,11 @@ class Surface(Brdf):
         return {"inputs": np.array([x for value in self.values.values() for x in np.atleast_1d(value)], float)}
 
     def f_r(self, wi: Triple, wo: Triple, buffers: Buffers) -> Triple:
-        gather = ops(wi[0]).gather
-        numbers = [gather(buffers["inputs"], k) for k in range(len(self.model.places))]
-        return self.model.f_r(Angles(wi, wo), self.model.by_name(numbers))
+        f = ops(wi[0])
+        numbers = [f.gather(buffers["inputs"], k) for k in range(len(self.model.places))]
+        # Approximations of albedos can take more from the layer below than there is.
+        r, g, b = (f.maximum(c, 0.0) for c in self.model.f_r(Angles(wi, wo), self.model.by_name(numbers)))
+        return r, g, b
 
 
 def _plain(value: Any) -> Any:
