@@ -3,11 +3,12 @@
 import math
 import sys
 import time
+from functools import partial
 
 import pytest
 from helpers import must_fail, run
 
-from sommerl.commands import console
+from sommerl.commands import console, fit
 from sommerl.formats import fits
 
 
@@ -73,7 +74,8 @@ def check_wrote(out, *paths):
     assert "".join(out.split()).endswith("Wrote" + ",".join(map(str, paths)))
 
 
-def test_what_was_written_is_printed(capsys, tmp_path):
+def test_what_was_written_is_printed(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(fit, "compare_on_sphere", partial(fit.compare_on_sphere, size=32, spp=8))
     paths = [tmp_path / name for name in ("x.json", "x.png")]
     few = ["--model", "lambertian", "--samples", "1000", "--starts", "1"]
     half = tmp_path / "half.json"
