@@ -23,6 +23,7 @@ from .options import FitOptions, Loss
 from .search import AGAIN, EDGE, FEWEST, LONG, SHORT, WORTHWHILE, End, slsqp
 
 Vector = NDArray[np.float64]
+MORE = 100_000  # samples with which the best result is refined: numbers as few as these need no more
 NONE = np.zeros((0, 3))  # albedos of its own
 
 
@@ -78,14 +79,17 @@ class SurfaceSearch:
     """A search for the inputs of one surface model."""
 
     def __init__(self, model: SurfaceModel, samples: Samples, options: FitOptions) -> None:
-        step = max(1, len(samples.wi) // FEWEST)
         self.whole = SurfaceObjective(model, samples, options.loss)
-        few = samples.some(slice(None, None, step))
-        self.part = self.whole if step == 1 else SurfaceObjective(model, few, options.loss)
+        self.part, self.more = (self._of(model, samples, options.loss, most) for most in (FEWEST, MORE))
         self._model, self._options = model, options
 
+    def _of(self, model: SurfaceModel, samples: Samples, loss: Loss, most: int) -> SurfaceObjective:
+        """The objective of about so many of the samples."""
+        step = len(samples.wi) // most
+        return SurfaceObjective(model, samples.some(slice(None, None, step)), loss) if step > 1 else self.whole
+
     def run(self, advance: Callable[[int], None]) -> tuple[End, list[End]]:
-        """The best result, and the results from all starting points with a part of the samples."""
+        """The best result, and the results from all starting points with a part of the samples; errors are of all."""
         ends: list[End] = []
         for start in self._starts():
             places = _descend(self.part, start, SHORT)
@@ -115,11 +119,11 @@ class SurfaceSearch:
         return [first, *(EDGE + (1 - 2 * EDGE) * random.random((self._options.starts - 1, len(places))))]
 
     def _refined(self, end: End) -> End:
-        places, distance = end.places, self.whole.value(end.places)[0]
+        places, distance = end.places, self.more.value(end.places)[0]
         for _ in range(AGAIN):
             before = distance
-            places = _descend(self.whole, places, LONG)
-            distance = self.whole.value(places)[0]
+            places = _descend(self.more, places, LONG)
+            distance = self.more.value(places)[0]
             if distance > WORTHWHILE * before:
                 break
         return End(end.start, places, NONE, self.whole.error(places))
