@@ -11,6 +11,7 @@ import pytest
 from browser import numbers
 from compact import FOLDS, material
 from helpers import must_fail, random_directions, run, tool
+from webgl import LINKED
 
 from sommerl import TrainOptions, load, save, train
 from sommerl.formats import buffers, texture
@@ -68,13 +69,15 @@ def test_a_texture_is_a_ktx2_file(materials, name, tmp_path):
     assert said["address"][2] == ("clamp" if made.mirrored else "repeat")
 
 
-SAMPLE = """
-([glsl, name, repeat, size, texels, wi, wo]) => {
+SAMPLE = (
+    f"""
+([glsl, name, repeat, size, texels, wi, wo]) => {{
+    {LINKED}"""
+    + """
     const bytes = (text) => Uint8Array.from(atob(text), (one) => one.charCodeAt(0)).buffer;
     const gl = document.createElement("canvas").getContext("webgl2");
     gl.getExtension("EXT_color_buffer_float");
     const count = bytes(wi).byteLength / 16;
-    const program = gl.createProgram();
     const vertex = `#version 300 es
         void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }`;
     const pixel = `#version 300 es
@@ -85,15 +88,7 @@ SAMPLE = """
             ivec2 at = ivec2(gl_FragCoord.xy);
             found = vec4(${name}(values, texelFetch(lights, at, 0).xyz, texelFetch(viewers, at, 0).xyz), 1.0);
         }`;
-    for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, pixel]]) {
-        const shader = gl.createShader(kind);
-        gl.shaderSource(shader, text);
-        gl.compileShader(shader);
-        if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
-        gl.attachShader(program, shader);
-    }
-    gl.linkProgram(program);
-    gl.useProgram(program);
+    const program = linked(gl, vertex, pixel);
     const put = (unit, target, upload) => {
         gl.activeTexture(gl.TEXTURE0 + unit);
         gl.bindTexture(target, gl.createTexture());
@@ -126,6 +121,7 @@ SAMPLE = """
     return [...out];
 }
 """
+)
 
 
 def sampled(chromium, folder, glsl):

@@ -7,25 +7,19 @@ import MaterialX.PyMaterialXGenGlsl as glsl
 import MaterialX.PyMaterialXGenShader as shaders
 import numpy as np
 from browser import numbers
+from webgl import LINKED
 
-DRAW = """
-([vertex, pixel, values, wi, wo]) => {
+DRAW = (
+    f"""
+([vertex, pixel, values, wi, wo]) => {{
+    {LINKED}"""
+    + """
     const read = (text) => new Float32Array(Uint8Array.from(atob(text), (one) => one.charCodeAt(0)).buffer);
     const [lights, viewers] = [read(wi), read(wo)];
     const count = lights.length / 3;
     const gl = document.createElement("canvas").getContext("webgl2");
     gl.getExtension("EXT_color_buffer_float");
-    const program = gl.createProgram();
-    for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, pixel]]) {
-        const shader = gl.createShader(kind);
-        gl.shaderSource(shader, text);
-        gl.compileShader(shader);
-        if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
-        gl.attachShader(program, shader);
-    }
-    gl.linkProgram(program);
-    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
-    gl.useProgram(program);
+    const program = linked(gl, vertex, pixel);
     const texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
     gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, count, 1);
@@ -53,6 +47,7 @@ DRAW = """
     return [...out];
 }
 """
+)
 # In the place of MaterialX's own, whose attributes and matrices a single triangle does not need.
 VERTEX = """#version 300 es
 out vec3 normalWorld;
