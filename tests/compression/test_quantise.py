@@ -198,7 +198,7 @@ def test_a_quality_that_grows_slowly():
 
     class Slow(search.Compressor):
         def __init__(self):
-            self.sizes = []
+            self.sizes, self._head = [], 0
 
         def _candidate(self, size, spread):
             self.sizes.append(size)
@@ -216,6 +216,14 @@ def test_a_name_that_fills_the_file():
         MaterialError, match="its name and source take 302 bytes of the 300 asked for; ask for at least 604 bytes"
     ):
         compress(source, CompactOptions(target_size=300))
+
+
+def test_a_quality_that_a_small_file_has_for_all_its_long_name():
+    source = lambertian_table(0.5)
+    source.name = "x" * 250
+    material, report = compress(source, CompactOptions(target_psnr=45), quality=lambda _: 50.0)
+    assert material.name == source.name
+    assert 604 <= report.tried[-1][0] < 700
 
 
 def test_a_quality_out_of_reach(monkeypatch):

@@ -181,8 +181,9 @@ class Compressor:
 
         Raises MaterialError if none of them is good enough.
         """
-        low, high = float(SMALLEST_SIZE), float(LARGEST_SIZE)
-        size, best, reached = FIRST_SIZE, None, -math.inf
+        # Below, `_candidate` refuses: less than half of the file would be left for the material.
+        low, high = float(max(SMALLEST_SIZE, 2 * self._head)), float(LARGEST_SIZE)
+        size, best, reached = max(FIRST_SIZE, low), None, -math.inf
         for tries_left in reversed(range(MOST_TRIES)):
             quality, material = self._candidate(int(size), 1.0)
             reached = max(reached, quality)
