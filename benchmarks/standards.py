@@ -1,7 +1,7 @@
 """How near do the surface models of standards come to measured-like materials, beside two lobes of GGX?
 
     uv run python benchmarks/stand_in_library.py OUT --count 1
-    uv run python benchmarks/standards.py OUT.bases.npz [--samples 20000] [--starts 4] [--every 1]
+    uv run python benchmarks/standards.py OUT.bases.npz [--samples 20000] [--starts 4] [--first 0] [--every 1]
 
 The first command decodes the 99 stand-ins of Zheng et al.'s neural processes, as tables of 90 × 24 × 36 cells. Each
 model is fitted to each of them, on the same samples. Printed are the relative errors (of f_r cos θ_i), and at the end,
@@ -27,12 +27,13 @@ def main() -> None:
     parser.add_argument("bases", type=Path)
     parser.add_argument("--samples", type=int, default=20_000)
     parser.add_argument("--starts", type=int, default=4)
+    parser.add_argument("--first", type=int, default=0, help="the number of the first material")
     parser.add_argument("--every", type=int, default=1, help="only every so many materials")
     given = parser.parse_args()
     models = [GGX, *STANDARDS]
     errors: dict[str, list[float]] = {}
     with np.load(given.bases) as held:
-        for name in held.files[:: given.every]:
+        for name in held.files[given.first :: given.every]:
             brdf = material(name, held[name])
             options = FitOptions(samples=given.samples, starts=given.starts)
             errors[name] = [each.relative_error for each in fit_models(brdf, models, options)]
