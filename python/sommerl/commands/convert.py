@@ -11,7 +11,7 @@ from typing import Any
 from ..compression.compact.search import CompactOptions
 from ..compression.material import SomManBrdf
 from ..compression.paper.options import TrainOptions
-from ..formats import buffers, registry, rgl, rgl_export, smrl, source_code, texture
+from ..formats import registry, rgl, rgl_export, smrl, source_code, texture
 from ..formats.format import Format
 from ..formats.load import load
 from ..formats.scattered import ScatteredBrdf
@@ -208,9 +208,8 @@ def checked(options: ConvertArguments) -> Format:
         if not (kind and kind.compressed):
             raise OptionError(f"--target-size: expected an output that is compressed, found {options.output}")
     check_output(options.output, registry.extensions(registry.writable()), *options.inputs)
-    for each in (texture, buffers):
-        for path in each.beside(options.output) if kind is each.FORMAT else ():
-            check_output(path, (path.suffix,), *options.inputs)
+    for path in kind.beside(options.output) if kind and kind.beside else ():
+        check_output(path, (path.suffix,), *options.inputs)
     assert kind  # or the check has said which ones there are
     return kind
 

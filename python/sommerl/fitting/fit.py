@@ -52,16 +52,19 @@ class Fit:
 
     def as_json(self) -> dict[str, Any]:
         """Everything as plain values, for a file or for --json."""
-        lobes = self.brdf.lobes if isinstance(self.brdf, MultiLobe) else None
-        standard = STANDARDS.get(self.model)
+        if isinstance(self.brdf, Surface):
+            lobes, source, parameters = None, self.brdf.model.source, self.brdf.as_json()
+        else:
+            lobes, source = len(self.brdf.lobes), family(self.model).source
+            parameters = [lobe.as_json() for lobe in self.brdf.lobes]
         return {
             "model": self.model,
-            "lobes": len(lobes) if lobes else None,
-            "source": standard.source if standard else family(self.model).source,
+            "lobes": lobes,
+            "source": source,
             "loss": self.options.loss,
             "error": self.error,
             "relative_error": self.relative_error,
-            "parameters": [lobe.as_json() for lobe in lobes] if lobes else self.brdf.details()["surface"],
+            "parameters": parameters,
             "sampling": self.options.sampling,
             "samples": self.samples,
             "seed": self.options.seed,
@@ -94,8 +97,8 @@ def fit_models(
     Raises the same errors as `fit`.
     """
     options = options or FitOptions()
-    if len(models) == 1:
-        check_model(models[0], options)
+    for model in models:
+        check_model(model, options, alone=len(models) == 1)
     samples = samples_of(brdf, options)
     steps = options.starts + REFINED
     found: list[Fit] = []

@@ -24,7 +24,7 @@ class Domain:
 
     def weight(self, cos_i: Array) -> Array:
         """By what f_r is multiplied before."""
-        return 0.0 * cos_i + 1.0 if self.loss == "l2" else cos_i
+        return type(cos_i)(1.0) if self.loss == "l2" else cos_i
 
     def mapped(self, f_r: Array) -> Array:
         """Weighted f_r in the domain."""

@@ -107,8 +107,9 @@ class Objective:
         lobes = len(self.families)
         columns: list[Matrix] = []
         for target in self._target:
-            slope = self._domain.slope(self._domain.unmapped(target))
-            weighted = np.concatenate([self._rows[:lobes], [self._domain.unmapped(target).numpy()]]) * slope.numpy()
+            measured = self._domain.unmapped(target)
+            slope = self._domain.slope(measured)
+            weighted = np.concatenate([self._rows[:lobes], [measured.numpy()]]) * slope.numpy()
             moments = weighted @ weighted.T
             columns.append(least_squares(moments[:lobes, :lobes], moments[:lobes, -1:], most))
         return np.concatenate(columns, axis=1)

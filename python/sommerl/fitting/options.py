@@ -67,10 +67,12 @@ def family(model: str) -> Family:
     return FAMILIES[model]
 
 
-def check_model(model: str, options: FitOptions) -> None:
-    """Raises OptionError for an unknown model, and for options that it cannot have."""
+def check_model(model: str, options: FitOptions, *, alone: bool = True) -> None:
+    """Raises OptionError for an unknown model, and for options that it cannot have. alone: as in `families_of`."""
     if model not in STANDARDS:
-        families_of(model, options.lobes)
+        families_of(model, options.lobes, alone=alone)
+    elif not alone:
+        return
     elif options.lobes is not None:
         raise OptionError(f"lobes: {model} has layers of its own and no number of lobes, found {options.lobes}")
     elif options.conserve_energy:

@@ -5,16 +5,14 @@ They are those of the source code (`shader`), whose functions read them if the m
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .. import __version__
 from ..compression.material import SomManBrdf
-from ..system.files import atomic_write
 from .format import Format
+from .manifest import manifest, write_all
 
 MARK = b"Written by Sommerl"  # after the arrays, so that commands know the file for their own
 TYPES = {"uint": ("uint32", "<u4"), "real": ("float32", "<f4")}
@@ -34,19 +32,8 @@ def write(material: SomManBrdf, path: str | Path) -> SomManBrdf:
         reader = array.reader.replace("@NAME@", prefix)
         listed.append({"reader": reader, "type": name, "offset": len(data), "count": len(numbers)})
         data += np.array(numbers, kind).tobytes()
-    manifest = {
-        "sommerl_buffers": 1,
-        "written_by": f"Sommerl {__version__}",
-        "name": material.name,
-        "source_sha256": material.source.sha256,
-        "metrics": {key: value for key, value in material.metrics.items() if isinstance(value, int | float)},
-        "byte_order": "little",
-        "arrays": listed,
-    }
-    said = json.dumps(manifest, indent=1, allow_nan=False).encode() + b"\n"
-    for name, content in zip(beside(path), (data + MARK, said), strict=True):
-        with atomic_write(name) as out:
-            out.write(content)
+    said = manifest("buffers", material, material.metrics, {"byte_order": "little", "arrays": listed})
+    write_all(dict(zip(beside(path), (data + MARK, said), strict=True)))
     return material
 
 
@@ -60,5 +47,6 @@ FORMAT = Format(
     (".bin",),
     "the arrays of the source code as bytes, with a manifest",
     write=write,
+    beside=beside,
     compressed=True,
 )

@@ -29,6 +29,7 @@ class Format:
     parts: of a format in which several files may be one material, any of which names it: all of them, in an order that
         is always the same, from the path of one. What it gives of other files is that path alone.
     write: writes a material to a path, and returns what the file holds: that material, or a table made from it.
+    beside: all files that `write` writes for a path, the path first; None if it writes that alone.
     write_several: writes any number of compact materials into one file; None if a file holds one material.
     compressed: whether it is written from compressed materials alone.
     names_source: whether a file that is written names the material's own file and holds nothing of it. `write` then
@@ -46,6 +47,7 @@ class Format:
     members: Callable[[Path, Any], Sequence[str]] | None = None
     parts: Callable[[Path], Sequence[Path]] | None = None
     write: Callable[[Any, Path], Any] | None = None
+    beside: Callable[[Path], Sequence[Path]] | None = None
     write_several: Callable[[Sequence[Any], Path], None] | None = None
     compressed: bool = False
     names_source: bool = False

@@ -8,7 +8,6 @@ Specification", version 2.0, and "Khronos Data Format Specification" 1.3.
 
 from __future__ import annotations
 
-import json
 import struct
 from pathlib import Path
 from typing import Any
@@ -35,8 +34,8 @@ from ..reflectance.nodes import (
     place,
 )
 from ..system.errors import FormatError
-from ..system.files import atomic_write
 from .format import Format
+from .manifest import manifest, write_all
 
 WIDTH, HEIGHT, DEPTH = 96, 48, 24  # texels along θ_h, θ_d and φ_d
 
@@ -140,9 +139,7 @@ def write(material: SomManBrdf, path: str | Path) -> TextureBrdf:
     FormatError for another."""
     path = Path(path)
     texture = of(material)
-    for name, data in zip(beside(path), _files(texture, path.stem), strict=True):
-        with atomic_write(name) as out:
-            out.write(data)
+    write_all(dict(zip(beside(path), _files(texture, path.stem), strict=True)))
     return texture
 
 
@@ -155,8 +152,8 @@ def _files(texture: TextureBrdf, stem: str) -> list[bytes]:
     from .shader.source import identifier  # only when it is needed
 
     prefix = identifier(stem)
-    said = json.dumps(manifest(texture, prefix), indent=1, allow_nan=False) + "\n"
-    return [ktx2(texture.values), said.encode(), function(texture, prefix).encode()]
+    said = manifest("texture", texture, texture.metrics, described(texture, prefix))
+    return [ktx2(texture.values), said, function(texture, prefix).encode()]
 
 
 def ktx2(values: NDArray[Any]) -> bytes:
@@ -181,15 +178,10 @@ def ktx2(values: NDArray[Any]) -> bytes:
     return b"".join((IDENTIFIER, head, level, descriptor, said, bytes(pad), whole.tobytes()))
 
 
-def manifest(texture: TextureBrdf, prefix: str) -> dict[str, Any]:
+def described(texture: TextureBrdf, prefix: str) -> dict[str, Any]:
     """What a texture is, for programs."""
     depth, height, width = texture.values.shape[:3]
     return {
-        "sommerl_texture": 1,
-        "written_by": f"Sommerl {__version__}",
-        "name": texture.name,
-        "source_sha256": texture.source.sha256,
-        "metrics": {key: value for key, value in texture.metrics.items() if isinstance(value, int | float)},
         "function": f"{prefix}_eval",
         "format": "R16G16B16A16_SFLOAT",
         "size": [width, height, depth],
@@ -249,5 +241,6 @@ FORMAT = Format(
     (".ktx2",),
     "a 3D texture in half precision, with its manifest and its GLSL",
     write=write,
+    beside=beside,
     compressed=True,
 )

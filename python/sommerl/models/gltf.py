@@ -10,7 +10,8 @@ from __future__ import annotations
 from ..reflectance.arrays import Array, Triple, ops
 from . import ggx
 from .family import PI, Angles
-from .standard import Input, SurfaceModel, Values, fifth, mix
+from .microfacets import fresnel
+from .standard import Input, SurfaceModel, Values, mix
 
 F0 = 0.04  # of a dielectric whose index of refraction is 1.5
 # MaterialX's fit of the directional albedo of this sheen: numerators and denominators of the terms 1, x, y, xy, x², y²
@@ -26,21 +27,17 @@ def f_r(a: Angles, v: Values) -> Triple:
     f = ops(a.cos_i)
     base, metallic, specular = v["baseColorFactor"], v["metallicFactor"], v["specularFactor"]
     facets = _facets(a, v["roughnessFactor"])
-    away = fifth(1.0 - a.cos_d)
-    reflected: list[Array] = []
-    for channel in v["specularColorFactor"]:
-        f0 = f.minimum(F0 * channel, 1.0)
-        reflected.append(f0 + (1.0 - f0) * away)
+    reflected = [fresnel(a.cos_d, f.minimum(F0 * channel, 1.0)) for channel in v["specularColorFactor"]]
     below = 1.0 - specular * _largest(reflected)
 
     fibres, dimming = sheen(a, v["sheenRoughnessFactor"])
     under_sheen = 1.0 - dimming * _largest(v["sheenColorFactor"])
-    coat = v["clearcoatFactor"] * (F0 + (1.0 - F0) * fifth(1.0 - a.cos_o))
+    coat = v["clearcoatFactor"] * fresnel(a.cos_o, F0)
     facets_c = _facets(a, v["clearcoatRoughnessFactor"])
     colour: list[Array] = []
     for k in range(3):
         plastic = below * base[k] / PI + specular * reflected[k] * facets
-        metal = facets * (base[k] + (1.0 - base[k]) * away)
+        metal = facets * fresnel(a.cos_d, base[k])
         material = v["sheenColorFactor"][k] * fibres + under_sheen * mix(plastic, metal, metallic)
         colour.append(mix(material, facets_c, coat))
     return colour[0], colour[1], colour[2]

@@ -9,6 +9,7 @@ from __future__ import annotations
 from ..reflectance.arrays import Array, Triple, ops
 from . import ggx
 from .family import PI, Angles
+from .microfacets import fresnel
 from .standard import Input, SurfaceModel, Values, dielectric, fifth, mix
 
 LUMINANCE = (0.212671, 0.715160, 0.072169)
@@ -32,7 +33,7 @@ def f_r(a: Angles, v: Values) -> Triple:
     width2 = width2 * width2
     rough = a.sin_h * a.sin_h + width2 * (a.cos_h * a.cos_h)
     narrow = (width2 - 1.0) / (PI * f.log(width2) * rough)
-    coat = 0.25 * v["clearcoat"] * (COAT + (1.0 - COAT) * away_d) * narrow * _masked(a.cos_i) * _masked(a.cos_o)
+    coat = 0.25 * v["clearcoat"] * fresnel(a.cos_d, COAT) * narrow * _masked(a.cos_i) * _masked(a.cos_o)
 
     back = 2.0 * roughness * a.cos_d * a.cos_d
     matte = (1.0 - 0.5 * away_i) * (1.0 - 0.5 * away_o) + back * (away_i + away_o + away_i * away_o * (back - 1.0))
@@ -40,8 +41,8 @@ def f_r(a: Angles, v: Values) -> Triple:
     for k in range(3):
         tint = f.where(luminance > 0.0, base[k] / f.where(luminance > 0.0, luminance, 1.0), 1.0)
         tinted = tint * root * root
-        gloss = (1.0 - metallic) * mix(clear, tinted + (1.0 - tinted) * away_d, v["spec_tint"])
-        gloss = gloss + metallic * (base[k] + (1.0 - base[k]) * away_d)
+        gloss = (1.0 - metallic) * mix(clear, fresnel(a.cos_d, tinted), v["spec_tint"])
+        gloss = gloss + metallic * fresnel(a.cos_d, base[k])
         sheen = v["sheen"] * away_d * mix(1.0, tint, v["sheen_tint"])
         colour.append(facets * gloss + coat + (1.0 - metallic) * (base[k] * matte / PI + sheen))
     return colour[0], colour[1], colour[2]
