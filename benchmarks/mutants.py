@@ -157,7 +157,7 @@ def too_long(*_: object) -> None:
 
 def quiet() -> list[str]:
     plugins = ("cacheprovider", "xdist", "hypothesispytest")
-    return [*(f"-pno:{name}" for name in plugins), "--assert=plain", "-o", "faulthandler_timeout=0"]
+    return [*(f"-pno:{name}" for name in plugins), "--assert=plain", "-o", "addopts=", "-o", "faulthandler_timeout=0"]
 
 
 def tests_of(mutant: Mutant, recorded: dict[str, Any]) -> list[str]:

@@ -2,7 +2,12 @@
 
 import gc
 import math
+import os
 import sys
+from pathlib import Path
+
+# Workers use all cores. If each had as many threads for linear algebra, these would mostly wait for each other.
+os.environ |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 import numpy as np
 import pytest
@@ -12,7 +17,15 @@ from helpers import SMALL
 from sommerl import BrdfTable
 from sommerl.commands import console
 
+SLOW = frozenset((Path(__file__).parent / "slow.txt").read_text().split())  # by benchmarks/slow_tests.py
+
 console.INTERVAL = math.inf  # or what is on standard error would depend on how fast a machine is
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if item.nodeid.partition("[")[0] in SLOW:
+            item.add_marker("slow")
 
 
 @pytest.fixture(autouse=True, scope="module")
