@@ -1,7 +1,4 @@
-// Arbitrary bytes for include/sommerl.hpp, with checksums put right, so that what lies behind them is reached:
-//
-//     clang++ -std=c++17 -O1 -fsanitize=fuzzer,address,undefined -Iinclude tests/cpp/fuzz.cpp -o fuzz
-//     mkdir corpus && cp tests/golden/*.smrl tests/golden/*.smrlib tests/golden/*.fbrdf corpus && ./fuzz corpus
+// Arbitrary bytes for include/sommerl.hpp, with checksums put right, so that what lies behind them is reached. By .ci/fuzz.
 #include "sommerl.hpp"
 
 #include <cstdlib>
