@@ -16,6 +16,7 @@ from scipy import stats
 WIDTH = 1e-3  # of the smallest scale in θ_h [rad], three minutes of arc
 BIN_ROWS, BIN_COLUMNS = 32, 16  # of bins, on each side of the viewer's plane
 COARSE, FINE = 20, 40  # nodes in a bin, along each side
+PIECE = 16_000  # directions that are evaluated at once
 LEVEL = 0.001  # of a whole family of tests: how often one of them may fail by chance
 LEAST = 10  # directions that a bin should expect
 
@@ -41,14 +42,21 @@ def grid(degrees, nodes):
 def expected(pdf, degrees, nodes=FINE):
     """The probability of each bin, (2, BIN_COLUMNS, BIN_ROWS), by a function pdf(wi, wo), the viewer at an angle."""
     wi, solid_angle = grid(degrees, nodes)
-    probabilities = pdf(wi, viewer(degrees)) * solid_angle
+    probabilities = in_pieces(pdf, wi, viewer(degrees)) * solid_angle
     return probabilities.reshape(2, BIN_COLUMNS, nodes, BIN_ROWS, nodes).sum(axis=(2, 4))
+
+
+def in_pieces(function, wi, wo):
+    """A function (wi, wo), piece by piece: what it keeps between its steps stays in the processor's caches."""
+    pieces = np.array_split(wi.reshape(-1, 3), 1 + wi.size // 3 // PIECE)
+    found = np.concatenate([function(piece, wo) for piece in pieces])
+    return found.reshape(*wi.shape[:-1], *found.shape[1:])
 
 
 def albedo(brdf, degrees):
     """∫ f_r cos θ_i dω_i, the mean of the channels."""
     wi, solid_angle = grid(degrees, COARSE)
-    return float((brdf.eval(wi, viewer(degrees)).mean(axis=-1) * wi[..., 2] * solid_angle).sum())
+    return float((in_pieces(brdf.eval, wi, viewer(degrees)).mean(axis=-1) * wi[..., 2] * solid_angle).sum())
 
 
 def counted(wi, degrees):
