@@ -39,10 +39,13 @@ def grid(degrees, nodes):
     return wi, solid_angle * 2 / (shape[1] * shape[2])
 
 
-def expected(pdf, degrees, nodes=FINE):
-    """The probability of each bin, (2, BIN_COLUMNS, BIN_ROWS), by a function pdf(wi, wo), the viewer at an angle."""
+def expected(pdf, degrees, nodes=FINE, at_once=False):
+    """The probability of each bin, (2, BIN_COLUMNS, BIN_ROWS), by a function pdf(wi, wo), the viewer at an angle.
+
+    at_once: for functions that take long for a single pair, as those that Dr.Jit traces.
+    """
     wi, solid_angle = grid(degrees, nodes)
-    probabilities = in_pieces(pdf, wi, viewer(degrees)) * solid_angle
+    probabilities = (pdf(wi, viewer(degrees)) if at_once else in_pieces(pdf, wi, viewer(degrees))) * solid_angle
     return probabilities.reshape(2, BIN_COLUMNS, nodes, BIN_ROWS, nodes).sum(axis=(2, 4))
 
 

@@ -74,7 +74,7 @@ def check_draws(plugin, density, number):
         return np.array(found).astype(float).reshape(wi.shape[:-1])
 
     drawn = np.array(sample.wo).T[np.array(sample.pdf) > 0].astype(float)
-    check_drawn_from(counted(drawn, 60), expected(pdf, 60, nodes=20), COUNT)
+    check_drawn_from(counted(drawn, 60), expected(pdf, 60, nodes=20, at_once=True), COUNT)
 
 
 @pytest.mark.parametrize("number", range(COUNT))
