@@ -108,7 +108,7 @@ def test_a_standard_and_what_is_written_of_it(capsys, tmp_path, no_file_beside):
     result = run_json(capsys, "fit", *quick, "openpbr", "-o", tmp_path / "x.json")
     (fit,) = result["fits"]
     assert (fit["model"], fit["lobes"], fit["parameters"]["model"]) == ("openpbr", None, "openpbr")
-    assert fit["blender"]["Base Color"][:3] == pytest.approx(fit["parameters"]["base_color"], rel=1e-5)
+    assert fit["blender"]["Coat Tint"][:3] == pytest.approx(fit["parameters"]["coat_color"], rel=1e-5)
     assert fit["psnr_soft_db"] > 25
     assert fit["smrl"] == {"target_size": 2700, "psnr_soft_db": None}  # the same material: no difference
     info = run_json(capsys, "info", tmp_path / "x.json")

@@ -169,4 +169,22 @@ def test_blender_has_a_socket_for_every_input():
     sockets = standard_files.blender(surface)
     assert set(standard_files.BLENDER.values()) == set(surface.values) - {"specular_weight"}
     assert sockets["Specular IOR Level"] == pytest.approx(surface.values["specular_weight"] / 2, rel=1e-5)
-    assert sockets["Base Color"] == pytest.approx([*surface.values["base_color"], 1.0], rel=1e-5)
+    assert sockets["Coat Tint"] == pytest.approx([*surface.values["coat_color"], 1.0], rel=1e-5)
+
+
+def check_seen_through_the_coat(sockets, values):
+    """By hand, from the standard's text: a half coat of index 1.5 and roughness 0.4 on a base of roughness 0.2."""
+    assert sockets["Roughness"] == pytest.approx((0.2 + (2 * 0.4**4 + 0.2**4) ** 0.25) / 2, rel=1e-5)
+    inside = 1 - 0.96 / 2.25
+    expected = [0.5 * c * (1 + (1 - inside) / (1 - inside * c)) for c in values["base_color"]]
+    assert sockets["Base Color"] == pytest.approx([*expected, 1.0], rel=1e-5)
+
+
+def test_blender_gets_the_base_as_it_is_seen_through_the_coat():
+    values = dict(material(OPEN_PBR, 3).values) | {"base_metalness": 0.0, "base_color": np.array([0.8, 0.4, 0.0])}
+    values |= {"specular_roughness": 0.2, "coat_weight": 0.5, "coat_roughness": 0.4, "coat_ior": 1.5}
+    check_seen_through_the_coat(standard_files.blender(Surface("x", OPEN_PBR, values)), values)
+    values["coat_weight"] = 0.0
+    bare = standard_files.blender(Surface("x", OPEN_PBR, values))
+    assert (bare["Roughness"], bare["Base Color"][:3]) == (0.2, pytest.approx([0.8, 0.4, 0.0]))
+    must_fail(check_seen_through_the_coat, bare, values)

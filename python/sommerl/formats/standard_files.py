@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..models import open_pbr
 from ..models.standard import Surface
 from ..system.files import atomic_write
 
@@ -37,8 +38,14 @@ BLENDER = {
 
 
 def blender(surface: Surface) -> dict[str, Any]:
-    """The inputs of Blender's Principled BSDF, by the names of its sockets; colours as RGBA. surface: of OpenPBR."""
-    values = surface.values
+    """The inputs of Blender's Principled BSDF, by the names of its sockets; colours as RGBA. surface: of OpenPBR.
+
+    Under a coat, OpenPBR widens the highlight and darkens the base, which Blender does not: roughness and colour of
+    the base are those that are seen through it.
+    """
+    values = dict(surface.values)
+    seen = [base * open_pbr.darkening(surface.values, k) for k, base in enumerate(values["base_color"])]
+    values |= {"specular_roughness": open_pbr.roughness_below(surface.values), "base_color": np.array(seen)}
     found: dict[str, Any] = {"Specular IOR Level": rounded(values["specular_weight"]) / 2}
     for socket, name in BLENDER.items():
         value = rounded(values[name])

@@ -34,10 +34,7 @@ OF_EDGE = EDGE * (1.0 - EDGE) ** 6
 def f_r(a: Angles, v: Values) -> Triple:
     """f_r [1/sr]."""
     base, edge, coat = v["base_color"], v["specular_color"], v["coat_weight"]
-    f, cosine = ops(a.cos_i), a.cos_o
-    rough4 = fourth(v["specular_roughness"])
-    under = f.sqrt(f.sqrt(f.minimum(2.0 * fourth(v["coat_roughness"]) + rough4, 1.0)))
-    roughness = mix(v["specular_roughness"], under, coat)
+    cosine, roughness = a.cos_o, roughness_below(v)
     alpha, metalness = roughness * roughness, v["base_metalness"]
     shape = ggx.distribution(a, alpha) * ggx.visibility(a, alpha)
     whole = albedo(cosine, alpha, 1.0)  # of GGX without Fresnel's losses
@@ -56,7 +53,6 @@ def f_r(a: Angles, v: Values) -> Triple:
     brighter_c = 1.0 + mirrored_c * (1.0 - whole_c) / whole_c
     over = coat * ggx.distribution(a, alpha_c) * ggx.visibility(a, alpha_c) * mirrored_c * brighter_c
     through_c = 1.0 - coat * albedo(cosine, alpha_c, f0_c) * brighter_c
-    inside = 1.0 - (1.0 - f0_c) / (v["coat_ior"] * v["coat_ior"])  # what a coat sends back to the base, of even light
 
     fuzz, through_f = _fuzz(a, v["fuzz_roughness"])
     away = 1.0 - a.cos_d
@@ -68,12 +64,25 @@ def f_r(a: Angles, v: Values) -> Triple:
         reflected = mix(base[k], 1.0, fifth(away)) - near_edge * a.cos_d * fifth(away) * away
         metal = v["specular_weight"] * shape * reflected * (1.0 + reflected * lost)
         below = mix(layered, metal, metalness)
-        sent_back = inside * base[k] * mix(1.0, v["specular_weight"], metalness)
-        darkened = mix(1.0, (1.0 - inside) / (1.0 - sent_back), coat) * mix(1.0, v["coat_color"][k], coat)
-        coated = over + through_c * darkened * below
+        tint = mix(1.0, v["coat_color"][k], coat)
+        coated = over + through_c * darkening(v, k) * tint * below
         weight = v["fuzz_weight"]
         colour.append(weight * v["fuzz_color"][k] * fuzz + (1.0 - weight * through_f) * coated)
     return colour[0], colour[1], colour[2]
+
+
+def roughness_below(v: Values) -> Array:
+    """Of the highlight that is seen through the coat, which widens it: `specular_roughness` without one."""
+    f = ops(v["specular_roughness"])
+    under = f.sqrt(f.sqrt(f.minimum(2.0 * fourth(v["coat_roughness"]) + fourth(v["specular_roughness"]), 1.0)))
+    return mix(v["specular_roughness"], under, v["coat_weight"])
+
+
+def darkening(v: Values, channel: int) -> Array:
+    """The share that the coat leaves of what lies below it, since it sends a part back, where it is absorbed."""
+    inside = 1.0 - (1.0 - at_normal(v["coat_ior"])) / (v["coat_ior"] * v["coat_ior"])  # sent back, of even light
+    sent_back = inside * v["base_color"][channel] * mix(1.0, v["specular_weight"], v["base_metalness"])
+    return mix(1.0, (1.0 - inside) / (1.0 - sent_back), v["coat_weight"])
 
 
 def fourth(x: Array) -> Array:

@@ -48,7 +48,7 @@ def view(
     """Shows materials: turned in the light, compared, and how they are stored.
 
     materials: BRDFs, or what `load` takes. sizes: also compress each by the preset compact to at most so many bytes,
-    half a minute to a minute and a half each. clusters: also compress each by the preset paper with so many entries.
+    some seconds each. clusters: also compress each by the preset paper with so many entries.
     height: of the frame in a notebook, in pixels.
 
     Raises MaterialError if there are none, OptionError for sizes and clusters out of range, and what `load` raises.
