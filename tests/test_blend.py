@@ -130,3 +130,19 @@ def complaint_of(capsys, *arguments):
     status, _, err = run(capsys, *arguments)
     assert status == 2
     return err
+
+
+def check_head(path, command):
+    assert f"// Command: {command}\n" in path.read_text()
+
+
+def test_the_head_of_source_code_has_the_command(capsys, tmp_path, monkeypatch):
+    """That of the blend, with names in place of paths."""
+    first, second = tmp_path / "first.smrl", tmp_path / "a b.smrl"
+    for path in (first, second):
+        save(KINDS["nodes"], path)
+    monkeypatch.setattr(convert_command, "_compressed", lambda brdf, options: KINDS["nodes"])
+    output = tmp_path / "c.h"
+    run_json(capsys, "blend", first, second, 0.25, "-o", output, "--target-size", "600", "--reciprocal")
+    check_head(output, "sommerl blend first.smrl 'a b.smrl' 0.25 -o c.h --target-size 600 --reciprocal")
+    must_fail(check_head, output, "sommerl convert 'a b.smrl' c.h --target-size 600 --reciprocal")

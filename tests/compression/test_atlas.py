@@ -12,7 +12,9 @@ from sampled import NODES
 from sommerl import Lattice, SomManBrdf, builtin
 from sommerl.compression.atlas import Atlas, is_compact
 from sommerl.reflectance.concatenated import Concatenated
-from sommerl.sampling.half_vector import HalfVectorSampler
+from sommerl.reflectance.grid import GridBrdf
+from sommerl.sampling import half_vector
+from sommerl.sampling.half_vector import VIEWERS, HalfVectorSampler, albedos
 from sommerl.system.errors import MaterialError
 
 A, B = random_directions(4000, 1), random_directions(4000, 2)
@@ -184,3 +186,22 @@ def test_parts_of_equal_length_begin_where_their_number_says():
     assert found["x"].start.tolist() == [0, 9]
     assert found["y"].start.tolist() == [0, 6]
     assert {name for name in parts.buffers if "starts" in name} == {"starts of y"}
+
+
+def uneven():
+    """Nine times as bright on one side of the viewer's plane as on the other; its albedo is 0.5."""
+    theta, phi = np.radians(np.arange(0, 86, 5.0)), np.radians(np.arange(0, 360, 15.0))
+    values = 0.5 / np.pi * (1 + 0.8 * np.sin(phi))
+    return GridBrdf(theta, theta, phi, np.broadcast_to(values[:, None], (len(theta), len(theta), len(phi), 3)))
+
+
+def check_even(found):
+    """Within the coarse quadrature's error."""
+    assert found.shape == (VIEWERS, 3)
+    assert np.allclose(found, 0.5, rtol=0.03)
+
+
+def test_tabulated_albedos_are_of_light_from_both_sides():
+    check_even(albedos(uneven()))
+    theta = np.linspace(0.01, np.pi / 2 - 0.01, VIEWERS)
+    must_fail(check_even, half_vector._light(uneven(), np.cos(theta), 2)[0].mean(axis=(1, 2, 3)))

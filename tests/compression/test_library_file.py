@@ -130,12 +130,18 @@ def bomb(size):
     return together(sections, head, b"\0" * size)
 
 
+def bomb_of_nothing(size):
+    sections, head, _ = apart(WHOLE)
+    return together(sections, [0] * len(head), b"\0" * size)
+
+
 HOSTILE = {
     "many materials": (lambda: with_head(count=2**32 - 1), "fits a file"),
     "many metrics": (lambda: with_head(metrics=255), "stream"),
     "long names": (lambda: with_head(names=2**32 - 1), "fits a file"),
     "long common parts": (lambda: with_head(common=2**32 - 1), "fits a file"),
     "a bomb": (lambda: bomb(2**27), "fits a file"),
+    "a bomb in an empty index": (lambda: bomb_of_nothing(2**26), "stream of 0 bytes"),
     "a longer material": (lambda: with_number("length", 2**32 - 1), "parts"),
     "a material over the next": (lambda: with_number("length", len(MATERIALS["cells"]) + 1), "parts"),
     "a longer name": (lambda: with_number("name_length", 2**16 - 1), "parts"),

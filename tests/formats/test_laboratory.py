@@ -192,3 +192,19 @@ def test_residuals_and_the_report_of_a_command(capsys, tmp_path):
 def test_residuals_need_samples(capsys, tmp_path):
     assert main(["convert", "nickel", str(tmp_path / "x.binary"), "--residuals", str(tmp_path / "r.csv")]) == 2
     assert "--residuals: expected a material of samples" in capsys.readouterr().err
+
+
+def check_like_the_first_side(samples):
+    """Whether the grid of samples is that of GRID, whose azimuths are from 0 to 180°."""
+    expected, found = (grid_of(each, name="x") for each in (GRID, samples))
+    assert found.mirrored
+    assert found.values.shape == expected.values.shape
+    assert np.allclose(found.values, expected.values)
+
+
+def test_one_side_of_a_grid_stands_for_both():
+    """Whichever it is, and however its azimuths are counted."""
+    flipped = Samples(GRID.wi, GRID.wo * [1, -1, 1], GRID.f_r)
+    check_like_the_first_side(flipped)
+    both = [np.concatenate([getattr(each, name) for each in (GRID, flipped)]) for name in ("wi", "wo", "f_r")]
+    must_fail(check_like_the_first_side, Samples(*both))

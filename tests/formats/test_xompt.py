@@ -144,3 +144,11 @@ def test_damaged(tmp_path, text, said):
     message = str(complaint(load, path))
     assert message.startswith(f"{path}: ")
     assert re.search(said, message)
+
+
+@pytest.mark.parametrize("turn", [lambda phi: -phi, lambda phi: 2 * np.pi - phi])
+def test_one_side_stands_for_both(tmp_path, turn):
+    """Azimuths from −180° to 0, or from 180° to 360°, are those of mirror images."""
+    check_grid(load(put(tmp_path, content(rows((THETA_I, THETA_O, turn(PHI)))))), SPECTRA)
+    both = turn(np.array([0.0, 1.0, 2.0, -2.0]))
+    must_fail(check_grid, load(put(tmp_path, content(rows((THETA_I, THETA_O, both))))), SPECTRA)

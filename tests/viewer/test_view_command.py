@@ -278,3 +278,18 @@ def test_a_browser_is_opened_but_none_in_the_terminal(monkeypatch):
 
     monkeypatch.setattr(webbrowser, "get", none)
     must_fail(check_opened, "http://127.0.0.1:1/")
+
+
+def check_no_page(capsys, path, page):
+    status, _, err = run(capsys, "view", path, "-o", page)
+    assert (status, page.exists()) == (1, False)
+    assert "bytes of data" in err
+
+
+def test_a_damaged_measured_bsdf_gives_no_page(capsys, tmp_path):
+    path, page = tmp_path / "paint.mbsdf", tmp_path / "page.html"
+    whole = page_files.mbsdf(np.ones((3, 3, 4, 3)))
+    path.write_bytes(whole[:-1])
+    check_no_page(capsys, path, page)
+    path.write_bytes(whole)
+    must_fail(check_no_page, capsys, path, page)

@@ -15,7 +15,7 @@ from . import answers
 from .arguments import Material, WritingArguments, byte_count, option, positional
 from .checks import check_apart
 from .compress import compact_one
-from .convert import ConvertArguments, checked, converted
+from .convert import ConvertArguments, checked, converted, typed
 from .parser import add_command
 
 
@@ -60,6 +60,7 @@ def blend(options: BlendArguments) -> dict[str, Any]:
     brdf = blended(load(options.first), load(options.second), options.weight)
     sources = {"blended": [options.first, options.second], "weight": options.weight}
     if kind is not smrl.FORMAT or options.target_size is not None:
-        return converted(brdf, kind, conversion) | sources
+        words = ["blend", options.first, options.second, str(options.weight), "-o", str(options.output)]
+        return converted(brdf, kind, conversion, typed(words, conversion)) | sources
     found = compact_one(called, brdf, options.output, CompactOptions(), options.json, reciprocal=options.reciprocal)
     return answers.of_materials([found]) | sources

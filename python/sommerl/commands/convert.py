@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from shlex import join
@@ -106,8 +107,11 @@ def convert(options: ConvertArguments) -> dict[str, Any]:
     return converted(brdf, kind, options)
 
 
-def converted(brdf: Brdf, kind: Format, options: ConvertArguments) -> dict[str, Any]:
-    """Writes a material in a format, and says what came of it; `input` is how it is called."""
+def converted(brdf: Brdf, kind: Format, options: ConvertArguments, command: str = "") -> dict[str, Any]:
+    """Writes a material in a format, and says what came of it; `input` is how it is called.
+
+    command: what was typed (`typed`), for the head of source code; `convert` itself if it is empty.
+    """
     output: Path = options.output
     kept = reciprocal(brdf) if options.reciprocal else brdf
     report = {} if kind.names_source else _report(brdf, output)
@@ -120,7 +124,7 @@ def converted(brdf: Brdf, kind: Format, options: ConvertArguments) -> dict[str, 
     elif kind is smrl.FORMAT and not isinstance(brdf, SomManBrdf):
         result = compress_one(options.input, kept, output, TrainOptions(), options.json)
     else:
-        written = _write(kept, kind, options)
+        written = _write(kept, kind, options, command or _command(options))
         size = output.stat().st_size if output.is_file() else None  # of what went through a pipe
         counts = Counts() if kind.names_source else written.counts
         result = {"input": options.input, "name": written.name, "output": str(output), "bytes_disk": size}
@@ -214,8 +218,8 @@ def checked(options: ConvertArguments) -> Format:
     return kind
 
 
-def _write(brdf: Brdf, kind: Format, options: ConvertArguments) -> Brdf:
-    """Writes a material; returns what the file holds, or names."""
+def _write(brdf: Brdf, kind: Format, options: ConvertArguments, command: str = "") -> Brdf:
+    """Writes a material; returns what the file holds, or names. command: for the head of source code."""
     assert kind.write
     if kind.names_source:
         kind.write(options.input, options.output)
@@ -225,13 +229,20 @@ def _write(brdf: Brdf, kind: Format, options: ConvertArguments) -> Brdf:
         return brdf
     if kind is source_code.FORMAT:
         compressed, sampler = _compressed(brdf, options), not options.no_sampler
-        return source_code.write(compressed, options.output, sampler=sampler, command=_command(options))
+        return source_code.write(compressed, options.output, sampler=sampler, command=command)
     return kind.write(_compressed(brdf, options) if kind.compressed else brdf, options.output)
 
 
 def _command(options: ConvertArguments) -> str:
-    """The command that was typed, with names of files in place of paths, which are nobody's business elsewhere."""
-    words = ["sommerl", "convert", *(Path(each).name or each for each in options.inputs), options.output.name]
+    return typed(["convert", *options.inputs, str(options.output)], options)
+
+
+def typed(words: Sequence[str], options: ConvertArguments) -> str:
+    """The command that was typed, with names of files in place of paths, which are nobody's business elsewhere.
+
+    words: those after `sommerl`. To them, the options that what is written depends on are added.
+    """
+    words = ["sommerl", *(Path(each).name or each for each in words)]
     for each in fields(options):
         value = getattr(options, each.name)
         if each.name in OF_CONTENT and value != each.default:

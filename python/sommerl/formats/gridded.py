@@ -13,6 +13,7 @@ from ..reflectance.grid import GridBrdf
 from ..reflectance.half_diff import TWO_PI
 from ..reflectance.samples import Samples, polar_angles
 from ..system.errors import FormatError, MaterialError
+from .grids import first_side
 
 STEP = 1e-4  # [rad] angles that agree to that are one
 AT_NORMAL = 1e-3  # [rad] from there on, Δφ means something
@@ -36,7 +37,7 @@ def grid_of(
     known = (theta_i > AT_NORMAL) & (theta_o > AT_NORMAL)
     if min(len(light), len(viewer)) < FEWEST or not known.any():
         return None
-    azimuths, found = _axis(phi[known])
+    azimuths, found = _axis(first_side(phi[known]))
     if azimuths[-1] > TWO_PI - STEP:  # the same as 0
         azimuths = azimuths[:-1]
         found = found % len(azimuths)

@@ -14,6 +14,7 @@ Axes = tuple[Values, Values, Values]
 
 AT_ONCE = 2**18  # directions evaluated at once
 STEP, HIGHEST = 5.0, 85.0  # [deg] of a grid that is written of what has none
+IN_PLANE = np.radians(0.5)  # azimuths between 0 and this, or this and π, lie on neither side of the plane of incidence
 
 
 def on_grid(brdf: Brdf, axes: Axes, *, both_sides: bool = False) -> Values:
@@ -46,14 +47,14 @@ def axes_of(brdf: Brdf) -> Axes:
 def regular(theta_i: Values, theta_o: Values, phi: Values, values: Values) -> tuple[Axes, Values] | None:
     """The axes, and the values (n, m, k, …), of samples that lie on a whole grid, each once; None if they do not.
 
-    Angles [rad] (count,), values (count, …). Azimuths are taken between 0 and 2π; a second end of a full turn is left
-    out.
+    Angles [rad] (count,), values (count, …). Azimuths are taken between 0 and 2π, and on the `first_side` if all lie on
+    the other; a second end of a full turn is left out.
     """
     around = np.mod(phi, TWO_PI)
     around[around > TWO_PI - SAME] = 0.0
     whole = np.abs(phi - TWO_PI) < SAME
     known = ~whole if (around[~whole] < SAME).any() else np.ones(len(phi), bool)
-    (first, i), (second, j), (third, k) = (_axis(angle[known]) for angle in (theta_i, theta_o, around))
+    (first, i), (second, j), (third, k) = (_axis(angle[known]) for angle in (theta_i, theta_o, first_side(around)))
     shape = len(first), len(second), len(third)
     if int(np.prod(shape)) != int(known.sum()):
         return None
@@ -63,6 +64,12 @@ def regular(theta_i: Values, theta_o: Values, phi: Values, values: Values) -> tu
     found = np.empty((len(flat), *values.shape[1:]))
     found[flat] = values[known]
     return (first, second, third), found.reshape(*shape, *values.shape[1:])
+
+
+def first_side(phi: Values) -> Values:
+    """Azimuths from 0 to 2π [rad]; where all lie on the second side of the plane of incidence, those of their mirror
+    images, which stand for both sides: instruments that rely on mirror symmetry measure one side alone."""
+    return phi if (np.sin(phi) > IN_PLANE).any() else np.minimum(phi, TWO_PI - phi)
 
 
 def _axis(angles: Values) -> tuple[Values, NDArray[np.intp]]:

@@ -30,6 +30,7 @@ from ..system.errors import FormatError, MaterialError
 from ..system.interrupt import hold_interrupts
 from ..system.threads import limit
 from .gridded import grid_of
+from .grids import IN_PLANE
 from .held_out import Choice, chosen
 from .meant import as_f_r
 from .prior import DEVIATIONS, FEWEST, MOST, Estimate, shipped
@@ -45,7 +46,6 @@ COARSEST = np.radians(
 )  # of a grid's usual steps in θ_i; between those of coarser ones, highlights would be seen twice
 NODES_A_SAMPLE, FEWEST_NODES, MOST_NODES = 20, 15_000, 60_000  # of the lattice
 SAME = 1e-4  # samples whose coordinates agree to that are one, measured several times
-IN_PLANE = np.radians(0.5)  # azimuths between 0 and this, or this and π, lie on neither side of the plane of incidence
 MOST_SAMPLES = 2_000_000
 PRIOR = "99 NP stand-ins of MERL's materials"
 BANDS = 10, 6  # of θ_h and θ_d, for which facts tell the deviations

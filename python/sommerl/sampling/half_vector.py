@@ -122,10 +122,7 @@ def albedo(brdf: Brdf, theta: ArrayLike, points: int = EXACT) -> NDArray[np.floa
         raise ValueError("albedo: polar angles have to be from 0 to π/2, and some are not")
     found = np.full((angles.size, 3), np.nan)
     for number in np.flatnonzero(known):
-        cos_o = np.cos(angles.reshape(-1)[number : number + 1])
-        sides = (1.0,) if brdf.mirrored else (1.0, -1.0)
-        light = [_light(brdf, cos_o, points, side)[0].mean(axis=(0, 1, 2, 3)) for side in sides]
-        found[number] = np.mean(light, axis=0)
+        found[number] = _reflected(brdf, np.cos(angles.reshape(-1)[number : number + 1]), points)
     return found.reshape(*angles.shape, 3)
 
 
@@ -133,11 +130,17 @@ def albedos(brdf: Brdf) -> NDArray[np.float64]:
     """The albedo of a BRDF for viewers at VIEWERS elevations, (VIEWERS, 3): of uniform light, the share that is
     reflected to the viewer.
 
-    The BRDF is evaluated for about 20,000 pairs of directions. See `albedo_at`.
+    The BRDF is evaluated for about 20,000 pairs of directions, or twice as many unless it is mirrored. See `albedo_at`.
     """
     # Not exactly at the normal and the horizon, where measured data may differ from what is right beside.
     theta = np.clip(np.arange(VIEWERS) / (VIEWERS - 1) * PI / 2, 0.01, PI / 2 - 0.01)
-    return _light(brdf, np.cos(theta), 2)[0].mean(axis=(1, 2, 3))
+    return _reflected(brdf, np.cos(theta), 2)
+
+
+def _reflected(brdf: Brdf, cos_o: NDArray[np.float64], finer: int) -> NDArray[np.float64]:
+    """The albedo for viewers at cos θ_o, (elevations, 3): the mean of both sides of the viewer's plane."""
+    sides = (1.0,) if brdf.mirrored else (1.0, -1.0)
+    return np.mean([_light(brdf, cos_o, finer, side)[0].mean(axis=(1, 2, 3)) for side in sides], axis=0)
 
 
 def albedo_at(cos_o: Array, table: Any) -> Triple:

@@ -126,7 +126,7 @@ def inflated(compressed: bytes, expected: int) -> bytes:
     """
     inflater = zlib.decompressobj(-zlib.MAX_WBITS)
     try:
-        payload = inflater.decompress(compressed, expected)
+        payload = inflater.decompress(compressed, max(expected, 1))  # 0 would stand for any number
         if len(payload) == expected and not inflater.eof:
             payload += inflater.decompress(inflater.unconsumed_tail, 1)
     except zlib.error:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..compression.material import SomManBrdf
 from ..compression.smrl import file as smrl
-from ..formats import tensor
+from ..formats import mbsdf, tensor
 from ..formats.rgl import RglBrdf
 from ..reflectance.brdf import Brdf
 from ..reflectance.cells import MERL, Lattice
@@ -26,7 +26,6 @@ ONE_SIDED = Lattice(reciprocal=False)  # cells at which BRDFs are sampled whose 
 TABLE = struct.Struct("<4sHHHBB")  # magic number; bins in θ_h, θ_d, φ_d; whether reciprocal; whether trilinear
 MAGIC = b"SMTB"
 LARGEST = 65504.0  # that half precision holds
-MBSDF = b"NVIDIA ARC MBSDF"  # which such files begin with
 LARGEST_MBSDF = 2**27  # bytes: the page reads no longer files
 REFERENCE = "reference"  # the step of a source itself
 
@@ -73,14 +72,15 @@ def held(brdf: Brdf, label: str, *, name: str | None = None, size: int | None = 
 
 
 def held_mbsdf(path: Path) -> Held | None:
-    """A file of NVIDIA's measured BSDFs as it is, which the page alone reads; None for a file of any other kind.
+    """A file of NVIDIA's measured BSDFs as it is, so that the page has its own grid; None for a file of any other kind.
 
-    Raises FormatError if it cannot be read.
+    Raises FormatError if it cannot be read, MaterialError if nothing in it is positive.
     """
     with door.opened(path) as file:
-        if not file.head.startswith(MBSDF):
+        if not mbsdf.looks_like(file.head):
             return None
         data = file.read(LARGEST_MBSDF)
+    mbsdf.parse(path, data)
     return Held(str(path), path.stem, "mbsdf", data, len(data), group=path.stem)
 
 
