@@ -891,22 +891,19 @@ template <class Entry>
 bool fill_cells(const Material& material, const std::vector<std::uint16_t>& above, const std::uint8_t* entries, std::size_t clusters,
                 std::vector<Entry>& index) {
     const auto [a, b, c] = material.bins;
-    index.resize(std::size_t(a) * b * c);
+    index.reserve(std::size_t(a) * b * c);
+    // For each φ_d, the last one above the horizon so far: in θ_d, or else the last in θ_h that has one.
+    std::vector<Entry> last(c);
     for (std::size_t i = 0; i < a; ++i) {
         for (std::size_t j = 0; j < b; ++j) {
             for (std::size_t k = 0; k < c; ++k) {
-                Entry& entry = index[k + c * (j + b * i)];
                 if (j < above[i * c + k]) {
                     std::uint32_t number = *entries++;
                     if (sizeof(Entry) == 2) number |= std::uint32_t(*entries++) << 8;
                     if (number >= clusters) return false;
-                    entry = static_cast<Entry>(number);
-                } else {  // the last one above the horizon in θ_d; or else the last in θ_h that has one
-                    std::size_t h = i;
-                    while (h > 0 && above[h * c + k] == 0) --h;
-                    const std::size_t last = above[h * c + k] ? above[h * c + k] - 1u : 0;
-                    entry = h == i && last >= j ? Entry(0) : index[k + c * (last + b * h)];
+                    last[k] = static_cast<Entry>(number);
                 }
+                index.push_back(last[k]);
             }
         }
     }

@@ -18,7 +18,7 @@ from sommerl.compression.smrl import file
 from sommerl.compression.smrl.library_index import INDEX_HEAD
 from sommerl.factored import file as factored_file
 from sommerl.system.errors import SommerlError
-from sommerl.system.sealed_file import PREFIX
+from sommerl.system.sealed_file import PREFIX, deflated
 
 FILES = sorted(path for path in GOLDEN.iterdir() if path.suffix in (".smrl", ".fbrdf", ".smrlib"))
 
@@ -225,3 +225,20 @@ def test_random_bytes_at_several_places():
     for kind in ("cells", "factored", "both"):
         some = [data for each, data in files if each == kind]
         check_refuses_like_python(codes(probe(), some), some, small(kind)[1])
+
+
+def flat():
+    """A small file of many cells, a third of them in columns of which none is above the horizon."""
+    lattice = Lattice(65535, 1, 63)
+    bins = (lattice.theta_h, lattice.theta_d, lattice.phi_d)
+    head = bytes(5) + struct.pack("<HHHBBI", *bins, lattice.reciprocal, 1, 1)
+    return compact.sealed(head + deflated(bytes(24 + int(lattice.above_horizon.sum()))))
+
+
+def check_reads_flat(program):
+    """In the time that other files of that size take: a search up each column for each of its cells took minutes."""
+    assert codes(program, [flat(), flat()[:-1]]) == ["none", "checksum"]
+
+
+def test_columns_below_the_horizon():
+    check_reads_flat(probe())

@@ -10,7 +10,7 @@ import pytest
 from headers import ERRORS, GOLDEN, KINDS, ROOT, asked, codes, output, pairs, sharing, written
 from helpers import must_fail, tool
 from test_header import check_densities, check_facts, check_samples, check_values
-from test_header_refusals import FILES, check_refuses_like_python, small
+from test_header_refusals import FILES, check_reads_flat, check_refuses_like_python, small
 
 import sommerl
 from sommerl.compression.smrl import file
@@ -114,3 +114,7 @@ def test_the_example():
     assert abs(albedo / brdf.albedo(np.arccos(0.8)).mean() - 1) < 0.1
     shown = re.findall(r"```no_run\n(.*?)```", (ROOT / "rust" / "reader" / "README.md").read_text(), re.DOTALL)
     assert shown[0].replace("// ", "//! ", 1) == (ROOT / "rust" / "reader" / "examples" / "albedo.rs").read_text()
+
+
+def test_columns_below_the_horizon():
+    check_reads_flat(example("probe"))

@@ -173,18 +173,16 @@ fn filled<Entry: Copy + Default>(
     mut entries: impl Iterator<Item = Entry>,
 ) -> Option<Vec<Entry>> {
     let [a, b, c] = lattice.bins;
-    let mut index = vec![Entry::default(); a * b * c];
+    let mut index = Vec::with_capacity(a * b * c);
+    // For each φ_d, the last one above the horizon so far: in θ_d, or else the last in θ_h that has one.
+    let mut last = vec![Entry::default(); c];
     for i in 0..a {
         for j in 0..b {
             for k in 0..c {
-                index[k + c * (j + b * i)] = if j < above[i * c + k] {
-                    entries.next()?
-                } else {
-                    // The last one above the horizon in θ_d; or else the last in θ_h that has one.
-                    let h = (0..=i).rev().find(|&h| above[h * c + k] > 0).unwrap_or(0);
-                    let last = above[h * c + k].saturating_sub(1);
-                    if h == i && last >= j { Entry::default() } else { index[k + c * (last + b * h)] }
-                };
+                if j < above[i * c + k] {
+                    last[k] = entries.next()?;
+                }
+                index.push(last[k]);
             }
         }
     }
