@@ -29,8 +29,8 @@ EXTENSION = ".html"
 HIGHEST_PORT = 2**16 - 1
 
 SERVED = """Page:
-  It needs a browser with WebGPU or WebGL2 and nothing else: it asks for nothing from any network. Files that are dropped on it
-  stay in it. Without -o, it is served at 127.0.0.1, to this machine, until Ctrl-C."""
+  It needs a browser with WebGPU or WebGL2 and nothing else: it asks for nothing from any network. Files that are
+  dropped on it stay in it. Without -o, it is served at 127.0.0.1, to this machine, until Ctrl-C."""
 
 
 @dataclass(frozen=True, kw_only=True)
