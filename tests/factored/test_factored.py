@@ -229,6 +229,13 @@ def test_bad_options(name, value):
         replace(FEW, **{name: value})
 
 
+@pytest.mark.parametrize("name", ["lobes", "terms"])
+def test_options_are_whole_numbers(name):
+    with pytest.raises(OptionError, match=f"{name}: expected a whole number, found 1.5"):
+        replace(FEW, **{name: 1.5})
+    assert type(getattr(replace(FEW, **{name: np.int64(2)}), name)) is int
+
+
 def test_bad_factors():
     lobes, rows, columns, scale = arrays(made())
     bad = {

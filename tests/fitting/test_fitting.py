@@ -230,6 +230,8 @@ def test_models_that_there_are_not(model, lobes, message):
         ({"lobes": 0}, "lobes: expected 1 to 4, found 0"),
         ({"samples": 10}, "samples: expected 1000 to 10000000, found 10"),
         ({"starts": 0}, "starts: expected 1 to 1000, found 0"),
+        ({"lobes": 1.5}, "lobes: expected a whole number, found 1.5"),
+        ({"starts": "3"}, "starts: expected a whole number, found '3'"),
         ({"seed": -1}, "seed: expected 0 to 18446744073709551615, found -1"),
         ({"loss": "l1"}, "loss: expected l2 or cosine-l2 or log or cube-root, found l1"),
         ({"sampling": "cube"}, "sampling: expected sphere or lattice, found cube"),

@@ -10,6 +10,7 @@ from sommerl.formats import merl
 from sommerl.reproduction.data import NAMES, STAND_INS, Data
 from sommerl.reproduction.methods import METHODS, Source
 from sommerl.reproduction.printed import printed
+from sommerl.system.errors import FormatError
 
 
 def check_small(sizes, most):
@@ -77,6 +78,9 @@ def test_forms_with_entries_of_their_own(source):
         must_fail(check_nearer, made["neighbours"], made[name], source)
 
 
-def test_what_a_material_has_no_form_of(source):
+def test_what_a_material_has_no_form_of(tmp_path, source):
     assert METHODS["network"].make(source) is None
+    (tmp_path / "networks.npz").write_bytes(b"PK\x03\x04 damaged")
+    with pytest.raises(FormatError, match=r"networks\.npz"):
+        METHODS["network"].make(Source("purple-paint", Data(tmp_path)))
     assert METHODS["table-trilinear"].make(source).size == 34_992_012

@@ -115,6 +115,17 @@ def test_content_tells_the_format(node, format):
     must_fail(check_kind, read(node, b"x" + WHOLE[format], name="x.json"), KINDS[format])
 
 
+def test_data_for_transmission_is_left_out(node):
+    first, rest = WHOLE["mbsdf"].split(b"\n", 1)
+    transmitted = b"MBSDF_DATA_TRANSMISSION=\n" + struct.pack("<3I", 0, 1, 1) + bytes(4)
+    for data in (first + b"\n" + transmitted + b"\n" + rest, WHOLE["mbsdf"] + b"\n" + transmitted):
+        found = read(node, data, name="x.mbsdf")
+        check_kind(found, "grid")
+        assert (found["thetas"], found["phis"]) == (3, 4)
+    for data in (first + b"\n" + transmitted, first + 2 * (b"\n" + transmitted) + b"\n" + rest):
+        assert "MBSDF_DATA_REFLECTION=" in sentences(node, [(data, "x.mbsdf")])[0]["error"]
+
+
 def test_names_are_one_line_of_what_can_be_seen(node):
     made = compact.material("minimal")
     made.name = "<b>a\x1b[31m\u202eb\nc"

@@ -16,6 +16,7 @@ from ..reflectance.info import Counts
 from ..reflectance.origin import source_of
 from ..system.errors import OptionError
 from ..system.optional import optional
+from ..system.whole import make_whole
 from .material import COLUMNS, ELEVATIONS, LEAST_COSINE, MOST, MOST_TERMS, PI, ROWS, FactoredBrdf
 
 FIRST_ITERATIONS, ITERATIONS = 200, 100  # of the first factorisations at most, and of all factors together
@@ -35,6 +36,7 @@ class FactorOptions:
     terms: int = 4
 
     def __post_init__(self) -> None:
+        make_whole(self, "lobes", "terms")
         for name, value in vars(self).items():
             if not 1 <= value <= MOST:
                 raise OptionError(f"{name}: expected 1 to {MOST}, found {value}")

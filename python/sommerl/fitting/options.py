@@ -11,6 +11,7 @@ from ..models.multi_lobe import FAMILIES
 from ..models.standards import STANDARDS
 from ..system.errors import OptionError
 from ..system.near import did_you_mean
+from ..system.whole import make_whole
 
 Loss = Literal["l2", "cosine-l2", "log", "cube-root"]
 Sampling = Literal["sphere", "lattice"]
@@ -51,6 +52,7 @@ class FitOptions:
             if getattr(self, field) not in get_args(allowed):
                 expected = " or ".join(get_args(allowed))
                 raise OptionError(f"{field}: expected {expected}, found {getattr(self, field)}")
+        make_whole(self, "lobes", "samples", "starts", "seed")
         ranges = [("samples", LEAST_SAMPLES, MOST_SAMPLES), ("starts", 1, MOST_STARTS), ("seed", 0, 2**64 - 1)]
         if self.lobes is not None:
             ranges.append(("lobes", 1, MOST_LOBES))

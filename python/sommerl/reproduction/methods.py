@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -20,12 +19,13 @@ from ..compression.paper.train import train
 from ..compression.smrl.file import decode, encode
 from ..factored import file as factored_file
 from ..factored.fit import factor
-from ..formats import merl, nbrdf
+from ..formats import merl, nbrdf, numpy_files
 from ..models.nbrdf import WEIGHTS
 from ..reflectance.brdf import Brdf
 from ..reflectance.lattice import Interpolation
 from ..reflectance.table import BrdfTable
 from ..render.judge import Judge, score
+from ..system import door
 from .data import RULES, Data
 from .model_fits import GGX_PARAMETERS, SGD_PARAMETERS, fitted_ggx, fitted_sgd
 
@@ -121,7 +121,7 @@ def network(source: Source) -> Stored | None:
     """The neural BRDF of that name, if an archive beside the material has it."""
     name = short_name(source.name)
     for archive in source.data.networks():
-        if f"{name}.npy" in zipfile.ZipFile(archive).namelist():
+        if f"{name}.npy" in numpy_files.names(archive, door.read(archive, numpy_files.LARGEST_FILE)):
             return Stored(nbrdf.read(archive, name), NUMBER * WEIGHTS)
     return None
 

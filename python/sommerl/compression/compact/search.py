@@ -11,13 +11,13 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
-from operator import index
 
 import numpy as np
 
 from ...reflectance.brdf import Brdf
 from ...reflectance.origin import source_of
 from ...system.errors import MaterialError, OptionError
+from ...system.whole import make_whole
 from ..material import SomManBrdf
 from ..palette import GainsAndShapes
 from ..smrl import file
@@ -86,13 +86,7 @@ class CompactOptions:
     def __post_init__(self) -> None:
         if self.target_size is not None and self.target_psnr is not None:
             raise OptionError("target: a size and a PSNR cannot both be asked for; give one of them")
-        try:
-            for name in ("effort", "seed"):
-                object.__setattr__(self, name, index(getattr(self, name)))
-            if self.target_size is not None:
-                object.__setattr__(self, "target_size", index(self.target_size))
-        except TypeError as error:
-            raise OptionError(f"target_size, effort, seed: they have to be whole numbers ({error})") from error
+        make_whole(self, "target_size", "effort", "seed")
         if self.target_size is not None and not SMALLEST_SIZE <= self.target_size <= LARGEST_SIZE:
             raise OptionError(f"target_size: expected {SMALLEST_SIZE} to {LARGEST_SIZE}, found {self.target_size}")
         psnr = self.target_psnr

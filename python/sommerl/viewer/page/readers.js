@@ -15,6 +15,7 @@ const LUMINANCE = [0.2126, 0.7152, 0.0722];
 const LARGEST = (2 - 2 ** -23) * 2 ** 127; // of single precision
 const MOST_CELLS = 2 ** 22;
 const LONGEST_HEAD = 2 ** 16;
+const NO_REFLECTION = "expected a line MBSDF_DATA_REFLECTION=, found none";
 
 const READERS = {
     smrl: (bytes) => decode(bytes.slice().buffer),
@@ -140,14 +141,26 @@ function withoutNegatives(colour) {
 
 /**
  * NVIDIA's .mbsdf: lines of text, the last one MBSDF_DATA_REFLECTION= or MBSDF_DATA=; then type (0 grey, 1 RGB), n, m in 4 bytes
- * each, and float32 [θ_in][θ_out][φ] at the centres of n, n and m equal bins. What follows, for transmission, is not looked at.
+ * each, and float32 [θ_in][θ_out][φ] at the centres of n, n and m equal bins. Data for transmission, before or after, is left out.
  */
 function readGrid(bytes) {
-    const head = latin(bytes.subarray(0, LONGEST_HEAD));
-    expect(head.startsWith(STARTS.mbsdf), "expected a measured BSDF (.mbsdf), found another kind");
-    const found = /\nMBSDF_DATA(_REFLECTION)?=\n/.exec(head);
-    expect(found, "expected a line MBSDF_DATA_REFLECTION=, found none");
-    const at = found.index + found[0].length;
+    expect(latin(bytes.subarray(0, LONGEST_HEAD)).startsWith(STARTS.mbsdf), "expected a measured BSDF (.mbsdf), found another kind");
+    let section = sectionFrom(bytes, 0);
+    if (section.transmitted) section = sectionFrom(bytes, section.start + section.length);
+    expect(!section.transmitted, NO_REFLECTION);
+    const { type, thetas, phis, size, length } = section;
+    const start = bytes.byteOffset + section.start;
+    const given = new Float32Array(bytes.buffer.slice(start, start + length));
+    expect(given.every(Number.isFinite), "expected finite numbers, found NaN or infinity");
+    const values = type ? given : new Float32Array(3 * size).map((_, i) => given[Math.floor(i / 3)]);
+    return { kind: "grid", thetas, phis, values, interpolation: "trilinear" };
+}
+
+/** The section that begins at a place, in text or right after the data of the one before: its size, and where its data is. */
+function sectionFrom(bytes, from) {
+    const found = /\nMBSDF_DATA(_REFLECTION|_TRANSMISSION)?=\n/.exec(latin(bytes.subarray(from, from + LONGEST_HEAD)));
+    expect(found, NO_REFLECTION);
+    const at = from + found.index + found[0].length;
     expect(bytes.length >= at + 12, "expected a size of the data, found a file that is cut off");
     const [type, thetas, phis] = [0, 4, 8].map((offset) => viewOf(bytes).getUint32(at + offset, true));
     expect(type < 2, `expected data of type 0 or 1, found type ${type}`);
@@ -156,9 +169,5 @@ function readGrid(bytes) {
     const length = 4 * size * (type ? 3 : 1);
     const left = bytes.length - at - 12;
     expect(left >= length, `expected ${length} bytes of data, found ${left}`);
-    const start = bytes.byteOffset + at + 12;
-    const given = new Float32Array(bytes.buffer.slice(start, start + length));
-    expect(given.every(Number.isFinite), "expected finite numbers, found NaN or infinity");
-    const values = type ? given : new Float32Array(3 * size).map((_, i) => given[Math.floor(i / 3)]);
-    return { kind: "grid", thetas, phis, values, interpolation: "trilinear" };
+    return { transmitted: found[1] === "_TRANSMISSION", type, thetas, phis, size, start: at + 12, length };
 }
