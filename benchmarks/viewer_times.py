@@ -13,6 +13,7 @@ import argparse
 import shutil
 import statistics
 import tempfile
+import time
 from pathlib import Path
 
 from playwright.sync_api import sync_playwright
@@ -43,7 +44,8 @@ def main() -> None:
                     context = browser.new_context(viewport={"width": 1280, "height": 800})
                     shown = context.new_page()
                     shown.goto(f"{html.as_uri()}#device={device}")
-                    shown.wait_for_function("window.sommerl?.first > 0", timeout=120_000)
+                    while not shown.evaluate("window.sommerl?.first > 0"):
+                        time.sleep(0.2)  # seldom, not to be in the page's way
                     found.append(shown.evaluate("[sommerl.first, sommerl.store.materials.get(0).milliseconds]"))
                     context.close()
                 browser.close()
