@@ -38,11 +38,6 @@ def origin_rows(brdf: Brdf) -> dict[str, str]:
     return rows
 
 
-def label(brdf: Brdf) -> str:
-    """A material's name, and how it is looked up."""
-    return f"{brdf.name} ({brdf.lookup})"
-
-
 FACTS = {
     "asymmetry": "asymmetry: |f(a, b) − f(b, a)| over the mean",
     "reciprocal": "both orders averaged",
