@@ -17,14 +17,14 @@ import time
 from pathlib import Path
 
 from playwright.sync_api import sync_playwright
+from viewer_pictures import OPTIONS
 
 import sommerl
 from sommerl.viewer.held import held
 from sommerl.viewer.page import page
 
-WEBGL = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 VULKAN = ["--use-webgpu-adapter=swiftshader", "--enable-features=Vulkan", "--use-vulkan=swiftshader"]
-BROWSERS = {"webgl": WEBGL, "webgpu": [*WEBGL, "--enable-unsafe-webgpu", *VULKAN]}
+BROWSERS = {"webgl": OPTIONS, "webgpu": [*OPTIONS, "--enable-unsafe-webgpu", *VULKAN]}
 
 
 def main() -> None:
