@@ -26,6 +26,9 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if item.nodeid.partition("[")[0] in SLOW:
             item.add_marker("slow")
+            item.add_marker(
+                "no_cover"
+            )  # Python 3.11 counts lines at a cost: loops in plain Python take four times as long
 
 
 @pytest.fixture(autouse=True, scope="module")

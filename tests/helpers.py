@@ -65,6 +65,13 @@ def tool(name: str) -> str:
     return found or name
 
 
+def run_node(*arguments: Any, given: bytes | None = None) -> bytes:
+    """What a program that Node runs writes, if it ends well. given: what it reads. At its end, Node waits for threads
+    of V8's that may wait for its own (https://github.com/nodejs/node/issues/54918): there are none."""
+    command = [tool("node"), "--single-threaded", *arguments]
+    return subprocess.run(command, input=given, capture_output=True, check=True, timeout=PATIENCE).stdout
+
+
 def random_directions(count: int, seed: int = 0) -> NDArray[np.float64]:
     """Unit vectors above the horizon, uniform over the hemisphere."""
     v = np.random.default_rng(seed).standard_normal((count, 3))

@@ -2,10 +2,9 @@
 
 import json
 import struct
-import subprocess
 from importlib.resources import files
 
-from helpers import tool
+from helpers import run_node
 
 FOLDERS = ("viewer/page", "compression/smrl/javascript")
 # A message is a length, JSON of such a length, and the bytes of a file; so is each answer, but for the bytes.
@@ -39,7 +38,6 @@ def program(folder, answer):
         for message, data in messages:
             head = json.dumps(message).encode()
             given += struct.pack("<II", len(head), len(data)) + head + data
-        done = subprocess.run([tool("node"), folder / "program.js"], input=given, capture_output=True, check=True)
-        return json.loads(done.stdout)
+        return json.loads(run_node(folder / "program.js", given=bytes(given)))
 
     return run

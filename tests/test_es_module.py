@@ -3,13 +3,12 @@
 import json
 import re
 import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 from compact import FOLDS, material
-from helpers import must_fail, random_directions, tool
+from helpers import must_fail, random_directions, run_node
 
 import sommerl
 from sommerl import Lattice, SomManBrdf
@@ -42,15 +41,14 @@ def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("package")
     for name in ("sommerl.js", "example.js", "package.json"):
         shutil.copy(SOURCE / name, made)
-    subprocess.run([tool("node"), SOURCE / "copy.js", made], check=True)
+    run_node(SOURCE / "copy.js", made)
     (made / "main.js").write_text(MAIN)
     (made / "pairs.json").write_text(json.dumps({"a": A.tolist(), "b": B.tolist(), "u": U.tolist()}))
     return made
 
 
 def asked(folder, path):
-    command = [tool("node"), folder / "main.js", path, folder / "pairs.json"]
-    answer = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
+    answer = json.loads(run_node(folder / "main.js", path, folder / "pairs.json"))
     return answer["info"], np.array(answer["found"])
 
 
@@ -99,8 +97,7 @@ def test_like_python(folder, tmp_path, kind):
 
 def test_the_example(folder):
     """Which the page shows, too."""
-    command = [tool("node"), folder / "example.js", GOLDEN / "nodes-2-both.smrl"]
-    printed = subprocess.run(command, capture_output=True, check=True, text=True).stdout
+    printed = run_node(folder / "example.js", GOLDEN / "nodes-2-both.smrl").decode()
     brdf = sommerl.load(GOLDEN / "nodes-2-both.smrl")
     (numbers,) = re.findall(r"f_r = (\S+) (\S+) (\S+) 1/sr", printed)
     assert np.allclose(np.float64(numbers), brdf.eval([0, 0, 1], [0.6, 0, 0.8]), rtol=1e-9)
@@ -125,7 +122,6 @@ console.log([...values, brdf.sample([0, 0, -1], up).pdf, said, random].join());
 
 def test_what_is_no_direction_or_no_file(folder):
     (folder / "rules.js").write_text(RULES)
-    command = [tool("node"), folder / "rules.js", GOLDEN / "nodes.smrl"]
-    printed = subprocess.run(command, capture_output=True, check=True, text=True).stdout.strip()
+    printed = run_node(folder / "rules.js", GOLDEN / "nodes.smrl").decode().strip()
     told = "expected at least 10 bytes, found 3,sample: random numbers have to be from 0 to 1, and some are not"
     assert printed == f"NaN,NaN,NaN,NaN,0,0,0,0,{told}"

@@ -3,7 +3,6 @@
 import json
 import shutil
 import struct
-import subprocess
 from importlib.resources import files
 from pathlib import Path
 from types import SimpleNamespace
@@ -24,7 +23,7 @@ from compact import (
     sealed,
     stream,
 )
-from helpers import must_fail, tool
+from helpers import must_fail, run_node
 from noted import FINE, NOT_PLAIN, with_notes
 
 from sommerl import Lattice, SomManBrdf
@@ -76,8 +75,8 @@ def node(tmp_path_factory):
 
     def run(contents):
         given = b"".join(struct.pack("<I", len(data)) + data for data in contents)
-        done = subprocess.run([tool("node"), folder / "main.js"], input=given, capture_output=True, check=True)
-        return json.loads(done.stdout, parse_int=float)  # JavaScript has but one kind of numbers
+        # JavaScript has but one kind of numbers.
+        return json.loads(run_node(folder / "main.js", given=given), parse_int=float)
 
     return run
 

@@ -4,13 +4,12 @@ import base64
 import hashlib
 import json
 import re
-import subprocess
 import zlib
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from helpers import compact_material, must_fail, random_directions, tool
+from helpers import compact_material, must_fail, random_directions, run_node
 from in_node import program
 from kinds import KINDS
 
@@ -243,7 +242,7 @@ MODULES = {
 
 
 def run(script):
-    return json.loads(subprocess.run([tool("node"), "-e", script], capture_output=True, check=True).stdout)
+    return json.loads(run_node("-e", script))
 
 
 def test_names_of_two_modules_do_not_meet():
