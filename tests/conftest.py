@@ -32,11 +32,15 @@ def pytest_collection_modifyitems(items):
 
 
 @pytest.fixture(autouse=True, scope="module")
-def settle():
+def settle(request):
     """Frees Mitsuba's scenes, which are cycles of references, while its threads are at rest, and not at whatever moment
-    of another module's tests: a run of all tests once stood still in one that never touches Mitsuba."""
+    of another module's tests: a run of all tests once stood still in one that never touches Mitsuba. What a module
+    keeps goes, too: each render compiles all BSDFs that there are in the process."""
     yield
     if "drjit" in sys.modules:
+        for kept in vars(request.module).values():
+            if hasattr(kept, "cache_clear") and kept.__module__ == request.module.__name__:
+                kept.cache_clear()
         sys.modules["drjit"].sync_thread()
         gc.collect()
 

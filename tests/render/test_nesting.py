@@ -21,7 +21,6 @@ INTEGRATORS = ("path", "direct", "volpath", "ptracer", "prb", "aov")
 SIZE = 12  # pixels of a sample
 
 
-@cache
 def bsdf(kind, sampler="half-vector"):
     return make_bsdf(KINDS[kind], fitted(sampler, KINDS[kind]))
 
