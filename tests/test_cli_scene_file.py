@@ -300,6 +300,7 @@ def test_mitsuba_warns_on_standard_error_once(capsys, tmp_path, short_passes):
         (None, ["nickel", "{}/scene.xml"], 2, "scene.xml: expected one scene file and no materials, found 2 inputs"),
         (None, ["{}/scene.xml", "--scene", "sphere"], 2, "--scene: expected no such option beside a scene file"),
         (None, ["{}/scene.xml", "--size", "256"], 2, "--size: expected no such option beside a scene file"),
+        (None, ["{}/scene.xml", "--size", "0"], 2, "--size: expected no such option beside a scene file"),
         (None, ["{}/scene.xml", "--against", "nickel"], 2, "--against: expected no such option"),
         (None, ["{}/scene.xml", "--sampler", "cosine"], 2, "--sampler: expected no such option"),
         (None, ["{}/scene.xml", "--lookup", "nearest"], 2, "--lookup: expected no such option"),

@@ -90,6 +90,12 @@ def test_sidedness_and_negative_shares():
     assert negative_share(lambda wi, wo: (0 * wi[2] - 1, 0 * wi[2] + 3, 0 * wi[2])) == pytest.approx(1 / 4)
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_asymmetry_of_what_is_negative(sign):
+    """By hand: ∬ 2 |a − b| a b over ∬ (a + b) a b, of cosines a and b, is 2 / 15 over 1 / 3."""
+    assert asymmetry(lambda wi, wo: (sign * 2 * wi[2], 0 * wi[2], 0 * wi[2])) == pytest.approx(0.4, rel=0.02)
+
+
 def test_colours_without_negatives():
     given = np.array([[0.2, 0.3, 0.4], [-0.1, 0.5, 0.2], [0.1, -0.9, 0.1], [0.0, 0.0, 0.0], [1.0, 0.4, -0.2]])
     found = without_negatives(given)

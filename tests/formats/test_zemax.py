@@ -58,6 +58,17 @@ def test_read(tmp_path):
     assert brdf.mirrored
 
 
+@pytest.mark.parametrize("azimuth", [[180, 270, 360], [180, 270, 359.9999], [0, 90, 180, 270, 360]])
+def test_the_other_side_of_the_plane(tmp_path, azimuth):
+    """A file whose material is symmetric about the plane of incidence may have either side, or both."""
+    there = VALUES[:, :, ::-1] if azimuth[0] else np.concatenate([VALUES, VALUES[:, :, -2::-1]], axis=2)
+    brdf = load(put(tmp_path, content(there, azimuth)))
+    check_planes(brdf, VALUES[0])
+    must_fail(check_planes, brdf, VALUES[0][:, ::-1])
+    beside = direction(40, 0), np.array([0.1, 0.5, 0.86]) / np.linalg.norm([0.1, 0.5, 0.86])
+    assert np.allclose(brdf.eval(*beside), load(put(tmp_path, WHOLE)).eval(*beside), atol=1e-4)
+
+
 def test_a_full_turn_and_colour(tmp_path):
     turn = np.concatenate([VALUES, VALUES[:, :, 1:2], VALUES[:, :, :1]], axis=2)
     brdf = load(put(tmp_path, content(np.repeat(turn, 3, 0), [0, 90, 180, 270, 360], "ASymmetrical", "XYZ")))

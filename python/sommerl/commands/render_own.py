@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -51,8 +52,9 @@ def scene_of(options: RenderArguments) -> Path | None:
         raise OptionError(
             f"{given[0]}: expected one scene file and no materials, found {len(options.materials)} inputs"
         )
+    usual = {field.name: field.default for field in fields(options)}
     for name in WITHOUT:
-        if getattr(options, name):
+        if getattr(options, name) != usual[name]:
             raise OptionError(
                 f"{flag(name)}: expected no such option beside a scene file, which decides that, found one"
             )

@@ -155,8 +155,9 @@ def _one_turn(
     if len(azimuth) > 1 and azimuth[-1] - azimuth[0] > 360 - 1e-3:
         values, azimuth = values[:, :-1], azimuth[:-1]
     if symmetry.lower() == "planesymmetrical":
-        kept = azimuth <= max(180.0, float(azimuth[0])) + 1e-3
-        values, azimuth = values[:, kept], azimuth[kept]
+        folded = np.where(azimuth > 180 + 1e-3, 360 - azimuth, azimuth)
+        _, kept = np.unique(folded.round(3), return_index=True)  # of those that say the same, the first
+        values, azimuth = values[:, kept], folded[kept]
     return values, azimuth
 
 

@@ -82,12 +82,12 @@ def energy_share(part: NDArray[np.float64], whole: NDArray[np.float64], lattice:
 
 
 def asymmetry(f_r: Callable[[Triple, Triple], Triple]) -> float:
-    """How far from reciprocal a BRDF is: ∬ |f(a, b) − f(b, a)| cos cos dω dω over the same integral of their mean,
-    channels added. 0 for a reciprocal one, and for a black one.
+    """How far from reciprocal a BRDF is: ∬ |f(a, b) − f(b, a)| cos cos dω dω over the same integral of their mean's
+    absolute value, channels added. 0 for a reciprocal one, and for a black one.
     """
     wi, wo, weight = _quadrature()
     one, other = np.sum(f_r(wi, wo), axis=0), np.sum(f_r(wo, wi), axis=0)
-    return float((weight * abs(one - other)).sum() / max((weight * (one + other) / 2).sum(), 1e-300))
+    return float((weight * abs(one - other)).sum() / max((weight * abs(one + other) / 2).sum(), 1e-300))
 
 
 def sidedness(f_r: Callable[[Triple, Triple], Triple]) -> float:
