@@ -15,7 +15,7 @@ from sommerl.formats.reading import AS_IT_IS, Reading, reading
 from sommerl.formats.residuals import COLUMNS
 from sommerl.formats.scattered import ScatteredBrdf, from_samples
 from sommerl.reflectance.grid import GridBrdf
-from sommerl.reflectance.samples import Samples
+from sommerl.reflectance.samples import Samples, polar_angles
 
 FABRIC = builtin("red-fabric")
 
@@ -39,6 +39,19 @@ def check_near(brdf, worst):
     high = np.minimum(wi[:, 2], wo[:, 2]) > 0.2
     true = FABRIC.eval(wi[high], wo[high])
     assert np.median(np.abs(brdf.eval(wi[high], wo[high]) - true) / true) < worst
+
+
+@pytest.mark.parametrize("name", ["out.csv", "out.npy", "out.binary"])
+def test_what_is_said_of_the_input_is_not_said_of_the_output(capsys, tmp_path, name):
+    """Some of what is written are tables of samples, too: the report reads them as f_r."""
+    some = on_grid(FABRIC, 10.0, 30.0, 80.0)
+    angles = np.degrees([*polar_angles(some.wi), *polar_angles(some.wo)])
+    rows = np.column_stack([*angles, some.f_r * some.wo[:, 2:]])
+    header = "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,r,g,b"
+    np.savetxt(tmp_path / "in.csv", rows, "%.8g", ",", header=header, comments="")
+    options = ["convert", tmp_path / "in.csv", "--values", "f_r-cos"]
+    result = run_json(capsys, *options[:2], tmp_path / name, *options[2:])
+    assert result["materials"][0]["samples_report"]["all"]["median"] < 0.002
 
 
 def test_a_regular_grid_is_recognised():

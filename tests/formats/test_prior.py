@@ -155,10 +155,13 @@ def test_from_a_plan_to_a_file(capsys, tmp_path):
     assert rows[0] == ["theta_i_deg", "phi_i_deg", "theta_o_deg", "phi_o_deg", "r", "g", "b"]
     assert np.allclose(np.radians(np.array(rows[1:])[:, :4].astype(float)), PLANNED, atol=1e-5)
     run(capsys, "eval", "red-fabric", plan, "-o", measured)
-    status, printed, warned = run(capsys, "convert", measured, out, "--prior", "--target-size", "2.7kB", "--json")
-    assert status == 0
-    assert "estimated from 99 NP stand-ins" in warned
-    facts = json.loads(printed)["materials"][0]["facts"]
-    assert facts["prior"].startswith("99 ")
-    check_near(load(out), 0.2)
-    assert out.with_name("out.coverage.png").exists()
+    for preset in (["--target-size", "2.7kB"], []):
+        status, printed, warned = run(capsys, "convert", measured, out, "--prior", *preset, "--json", "--overwrite")
+        assert status == 0
+        assert "estimated from 99 NP stand-ins" in warned
+        facts = json.loads(printed)["materials"][0]["facts"]
+        assert facts["prior"].startswith("99 ")
+        check_near(load(out), 0.2)
+        assert out.with_name("out.coverage.png").exists()
+    assert load(out).facts["prior"].startswith("99 ")
+    assert run(capsys, "compress", measured, "-o", out, "--prior", "--overwrite")[0] == 0

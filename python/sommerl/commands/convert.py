@@ -37,7 +37,7 @@ from .arguments import (
 )
 from .checks import check_apart, check_output
 from .compress import compact_one, compress_one, fitted, trained
-from .inputs import expanded, is_several, read_all
+from .inputs import expanded, is_several, load_written, read_all
 from .laboratory import ReportArguments, check_samples, reported, warn_of_samples
 from .parser import add_command
 from .rows import changed_rows, fact_rows, judged_rows
@@ -143,7 +143,7 @@ def converted(brdf: Brdf, kind: Format, options: ConvertArguments, command: str 
     if kind.read and not kind.names_source:
         report |= reported(options.input, brdf, output, lambda other: _again(other, kind, options), options)
     if isinstance(brdf, ScatteredBrdf) and "coverage_image" in report:
-        coverage(brdf, Path(report["coverage_image"]), load(output) if kind.read and output.is_file() else brdf)
+        coverage(brdf, Path(report["coverage_image"]), load_written(output) if kind.read and output.is_file() else brdf)
     return answers.of_materials([result | report])
 
 
@@ -154,7 +154,7 @@ def _again(brdf: Brdf, kind: Format, options: ConvertArguments) -> Brdf:
         return _compressed(kept, options)
     with TemporaryDirectory() as folder:
         path = Path(folder) / options.output.name
-        return load(path) if _write(kept, kind, replace(options, output=path)) else brdf
+        return load_written(path) if _write(kept, kind, replace(options, output=path)) else brdf
 
 
 def _convert_several(options: ConvertArguments, kind: Format) -> dict[str, Any]:

@@ -11,7 +11,9 @@ from typing import TypeVar
 from ..formats import registry
 from ..formats.load import load
 from ..formats.names import split_member
+from ..formats.reading import AS_IT_IS, reading
 from ..models.builtin import NAMES
+from ..reflectance.brdf import Brdf
 from ..system.errors import MaterialError, SommerlError
 from .console import warn
 
@@ -30,6 +32,12 @@ def expanded(given: Iterable[str]) -> list[str]:
     Raises MaterialError if there are none.
     """
     return [source for one in given for source in (_in_folder(one) or _matching(one) or [one])]
+
+
+def load_written(path: Path) -> Brdf:
+    """A file that the command wrote: what is said of samples (--values, --prior, …) is said of its input."""
+    with reading(AS_IT_IS):
+        return load(path)
 
 
 def readable(sources: Iterable[str], given: Sequence[str]) -> list[str]:

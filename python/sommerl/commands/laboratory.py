@@ -10,7 +10,6 @@ from typing import Any
 
 from ..formats import residuals
 from ..formats.compared import compared, samples_of
-from ..formats.load import load
 from ..formats.plausible import checked
 from ..formats.reading import asked
 from ..formats.scattered import REACH_DEGREES, extrapolated
@@ -19,6 +18,7 @@ from ..system.errors import OptionError
 from . import console
 from .arguments import Arguments, option
 from .checks import check_output
+from .inputs import load_written
 
 NOTABLE = 0.1  # the share that is extrapolated from which a warning is due
 PARTS = {"held_out": "every tenth sample", "held_out_lines": "lines of incidence"}
@@ -67,14 +67,14 @@ def reported(
     samples = samples_of(brdf)
     if samples is None or not output.is_file():
         return {}
-    written = load(output)
+    result = load_written(output)
     with console.progress(f"leaving samples out of {brdf.name}"):
-        report = compared(brdf, written, made)
+        report = compared(brdf, result, made)
     physics = checked(samples, brdf, asked() if "rows" in brdf.facts else None)
     for sentence in physics["mistakes"]:
         console.warn(f"{source}: {sentence}")
     if options.residuals is not None:
-        residuals.write(samples, written, options.residuals)
+        residuals.write(samples, result, options.residuals)
     if not options.json:
         console.print_rows(f"{output} against the samples", rows(report or {}, physics))
     return {"samples_report": report, "physics": physics}

@@ -22,6 +22,7 @@ INCIDENCES = (10, 45, 75)  # degrees
 IN_CUT = np.radians(1.5)  # samples that are nearer than that to a cut are drawn
 CUT_STEPS = 1441  # of its curve
 DEEPEST = 1e-5  # of the largest value, that is drawn
+MOST_LABELS = 3  # along the radius: more would meet
 
 
 def coverage(brdf: ScatteredBrdf, path: Path, written: Brdf | None = None) -> None:
@@ -76,6 +77,8 @@ def cut(ax: Any, samples: Samples, brdf: Brdf, theta_i: float, estimate: Estimat
     ax.plot([-theta_i, -theta_i], [floor, top], ":", color="grey", linewidth=0.8)
     ax.set(thetamin=-90, thetamax=90, title=f"θ_i = {np.degrees(theta_i):.3g}°, {int(those.sum())} samples")
     ax.set_rlim(floor, top)
+    high, low = np.floor(np.log10(top)), np.ceil(np.log10(floor))
+    ax.set_rticks(10.0 ** np.arange(high, low - 1, -max(1, np.ceil((high - low + 1) / MOST_LABELS))))
 
 
 def _incidences(samples: Samples) -> list[float]:
@@ -89,7 +92,7 @@ def _incidences(samples: Samples) -> list[float]:
 
 def _residuals(ax: Any, samples: Samples, brdf: Brdf) -> None:
     errors = relative_errors(samples, brdf)
-    ax.plot(np.abs(samples.f_r).mean(axis=1), np.maximum(errors, 1e-5), ".", markersize=1.5, alpha=0.4)
+    ax.plot(np.abs(samples.f_r).mean(axis=1), np.maximum(errors, 1e-5), ".", markersize=_size(samples), alpha=0.4)
     ax.axhline(float(np.median(errors)), color="black", linewidth=0.8)
     ax.set(
         xscale="log",
@@ -100,13 +103,20 @@ def _residuals(ax: Any, samples: Samples, brdf: Brdf) -> None:
     )
 
 
+def _size(samples: Samples) -> float:
+    """Of a dot [points]: few samples have larger ones, many do not hide each other."""
+    return float(np.clip(40 / np.sqrt(len(samples.wi)), 1.5, 6))
+
+
 def _slices(ax: Any, brdf: ScatteredBrdf) -> None:
     above = COVERAGE.above_horizon
     with np.errstate(invalid="ignore"):
         share = (brdf.measured & above).sum(axis=2) / above.sum(axis=2)  # NaN below the horizon, where nothing is drawn
     image = ax.imshow(share, origin="lower", extent=(0, 90, 0, 1), aspect="auto", cmap="viridis", vmin=0, vmax=1)
     theta_h, theta_d, _ = half_diff(split(brdf.samples.wi), split(brdf.samples.wo))
-    ax.plot(np.degrees(theta_d), np.sqrt(theta_h * 2 / np.pi), ".", color="white", markersize=1.5, alpha=0.5)
+    ax.plot(
+        np.degrees(theta_d), np.sqrt(theta_h * 2 / np.pi), ".", color="white", markersize=_size(brdf.samples), alpha=0.5
+    )
     ticks = np.array([0, 1, 5, 15, 30, 50, 90])
     ax.set_yticks(np.sqrt(ticks / 90), [f"{tick}°" for tick in ticks])
     ax.set(xlabel="θ_d [°]", ylabel="θ_h", title="share of φ_d", xlim=(0, 90), ylim=(0, 1))

@@ -72,6 +72,11 @@ def parsed(data: bytes) -> dict[str, Any]:
     raise FormatError(f"expected notes of JSON objects, {DEEPEST} deep at most, with finite numbers, found others")
 
 
+def plain(facts: Mapping[str, Any]) -> Notes:
+    """Those of a source's facts that a file can hold. Others, lists and longer texts, are told when it is read."""
+    return {name: value for name, value in facts.items() if _is_name(name) and _is(value, PLAIN)}
+
+
 def check(options: Mapping[str, Any], metrics: Mapping[str, Any]) -> None:
     """Raises FormatError for options or metrics that a file must not hold (docs/format.md)."""
     facts = options.get(FACTS, {})
