@@ -22,7 +22,7 @@ INCIDENCES = (10, 45, 75)  # degrees
 IN_CUT = np.radians(1.5)  # samples that are nearer than that to a cut are drawn
 CUT_STEPS = 1441  # of its curve
 DEEPEST = 1e-5  # of the largest value, that is drawn
-MOST_LABELS = 3  # along the radius: more would meet
+MOST_LABELS = 2  # along the radius: more would meet
 
 
 def coverage(brdf: ScatteredBrdf, path: Path, written: Brdf | None = None) -> None:
