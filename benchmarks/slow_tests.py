@@ -5,7 +5,8 @@
 
 A test function is slow if all its cases together, with what is made for them, take longer than `--least` seconds; `uv
 run pytest` leaves it out, `.ci/run` does not. Prints how much time is left to the others. Times depend on the machine,
-and on what else it does: the list is made anew when `uv run pytest` takes too long, not with every change.
+and on what else it does: the list is made anew when `uv run pytest` takes too long, not with every change, and with
+`../shared` beside the clone, whose tests are in it, too.
 """
 
 from __future__ import annotations
