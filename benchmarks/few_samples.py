@@ -30,7 +30,10 @@ from sommerl.reflectance.samples import Samples
 from sommerl.render.judge import Judge
 
 FOLDS = 5
-RUNS = ((16, "planned"), (16, "cells"), (100, "cells"), (1458, "cells"), (16, "solid angle"), (100, "solid angle"))
+RUNS = (
+    *((16, "planned"), (16, "cells"), (100, "cells"), (1458, "cells")),
+    *((16, "solid angle"), (100, "solid angle"), (1458, "solid angle")),
+)
 
 
 def main() -> int:
