@@ -78,7 +78,8 @@ def cut(ax: Any, samples: Samples, brdf: Brdf, theta_i: float, estimate: Estimat
     ax.set(thetamin=-90, thetamax=90, title=f"θ_i = {np.degrees(theta_i):.3g}°, {int(those.sum())} samples")
     ax.set_rlim(floor, top)
     high, low = np.floor(np.log10(top)), np.ceil(np.log10(floor))
-    ax.set_rticks(10.0 ** np.arange(high, low - 1, -max(1, np.ceil((high - low + 1) / MOST_LABELS))))
+    if high >= low:
+        ax.set_rticks(10.0 ** np.arange(high, low - 1, -max(1, np.ceil((high - low + 1) / MOST_LABELS))))
 
 
 def _incidences(samples: Samples) -> list[float]:
