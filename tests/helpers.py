@@ -66,9 +66,8 @@ def tool(name: str) -> str:
 
 
 def run_node(*arguments: Any, given: bytes | None = None) -> bytes:
-    """What a program that Node runs writes, if it ends well. given: what it reads. At its end, Node waits for threads
-    of V8's that may wait for its own (https://github.com/nodejs/node/issues/54918): there are none."""
-    command = [tool("node"), "--single-threaded", *arguments]
+    """What a program that Node runs writes, if it ends well. given: what it reads."""
+    command = [tool("node"), *arguments]
     return subprocess.run(command, input=given, capture_output=True, check=True, timeout=PATIENCE).stdout
 
 
