@@ -6,7 +6,8 @@ Each of the 99 NP stand-ins is sampled as a table of 90 × 24 × 36 cells, and e
 the stand-ins among which it is not, as they are in the package. Samples are at cells drawn at random, each as likely as
 another, as in Zheng et al. 2021 (--every N: of one material in N); at cells drawn by solid angle; or where that prior
 plans them. Samples have no noise. PSNR is in soft light, against the table. `inside`: the share of all cells, by solid
-angles and cosines, whose logarithm is within one and two standard deviations of the estimate.
+angles and cosines, whose logarithm is within one and two standard deviations of the estimate. `errors`: how far off
+logarithms are, in standard deviations, the root of the mean square.
 
 The package's file was made from MERL tables of the stand-ins (../shared/tools/np_to_merl.py) by
 
@@ -55,15 +56,16 @@ def main() -> int:
             for count, how in RUNS:
                 at = _samples(tables[name], count, how, number, plans)
                 estimate = prior.estimate(at)
-                found[count, how][name] = judge.metrics(estimate)["psnr_soft_db"], *_inside(tables[name], estimate)
+                found[count, how][name] = judge.metrics(estimate)["psnr_soft_db"], *_off(tables[name], estimate)
             print(f"{sum(map(len, found.values()))} of {len(names) // options.every * len(RUNS)}", file=sys.stderr)
-    print("| samples | | mean | worst, and the next | inside 1σ, 2σ |\n|---|---|---|---|---|")
+    print("| samples | | mean | worst, and the next | inside 1σ, 2σ | errors |\n|---|---|---|---|---|---|")
     for (count, how), each in found.items():
         psnr = {name: row[0] for name, row in each.items()}
         worst, *others = sorted(psnr, key=lambda name: psnr[name])
-        mean, one, two = np.mean(list(each.values()), axis=0)
+        mean, one, two, square = np.mean(list(each.values()), axis=0)
         next_ones = ", ".join(f"{psnr[name]:.1f}" for name in others[:3])
-        print(f"| {count} | {how} | {mean:.1f} | {psnr[worst]:.1f} ({worst}), {next_ones} | {one:.0%}, {two:.0%} |")
+        row = f"{count} | {how} | {mean:.1f} | {psnr[worst]:.1f} ({worst}), {next_ones} | {one:.0%}, {two:.0%}"
+        print(f"| {row} | {np.sqrt(square):.2f} |")
     return 0
 
 
@@ -79,16 +81,16 @@ def _samples(table: Any, count: int, how: str, seed: int, plans: dict[int, Any])
     return Samples(wi, wo, table.eval(wi, wo))
 
 
-def _inside(table: Any, estimate: Any) -> tuple[float, float]:
-    """Which shares of the cells are within one and two standard deviations."""
+def _off(table: Any, estimate: Any) -> tuple[float, float, float]:
+    """Which shares of the cells are within one and two standard deviations; and the mean square, in their squares."""
     above = DEVIATIONS.above_horizon
     wi, wo = (np.stack(w, axis=-1) for w in directions(*(angle[above] for angle in DEVIATIONS.angles())))
     cosines = np.prod(DEVIATIONS.cosines(), axis=0)[above]
     true, said = (np.log(brdf.eval(wi, wo) * cosines[:, None] + SMALL).mean(axis=1) for brdf in (table, estimate))
     off = np.abs(true - said) / estimate.deviation[above]
     weight = DEVIATIONS.solid_angles()[above] * cosines
-    one, two = (float((weight * (off < most)).sum() / weight.sum()) for most in (1, 2))
-    return one, two
+    one, two, square = (float((weight * each).sum() / weight.sum()) for each in (off < 1, off < 2, off**2))
+    return one, two, square
 
 
 if __name__ == "__main__":
