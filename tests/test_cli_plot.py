@@ -36,6 +36,9 @@ def test_everything_that_applies_is_on_one_sheet(capsys, smrl, tmp_path, extensi
 def test_one_kind(capsys, smrl, tmp_path, kind):
     result = run_json(capsys, "plot", smrl, "-o", tmp_path / "x.png", "--kind", kind)
     assert result["kinds"] == [kind]
+
+
+def test_all_kinds_of_a_formula(capsys, tmp_path):
     result = run_json(capsys, "plot", "nickel", "-o", tmp_path / "nickel.png")
     assert result["kinds"] == ["lobes", "theta-h", "slices"]
 

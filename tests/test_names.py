@@ -10,6 +10,7 @@ from helpers import compact_material, must_fail, random_directions, run
 
 from sommerl import NAMES, builtin, load, save
 from sommerl.commands.demo import write_page
+from sommerl.formats import scattered
 from sommerl.formats.shader.head import comment
 from sommerl.plots.contact_sheet import captioned
 from sommerl.plots.page import text
@@ -51,7 +52,8 @@ def test_every_command_takes_every_name(capsys, tmp_path, name):
 
 
 @pytest.mark.parametrize("name", [name for name in NASTY if "/" not in name])
-def test_samples_with_such_names(capsys, tmp_path, name):
+def test_samples_with_such_names(capsys, tmp_path, monkeypatch, name):
+    monkeypatch.setattr(scattered, "FEWEST_NODES", 1000)
     a, b = (w[w[:, 2] > 0.1][:60] for w in (random_directions(100, s) for s in (1, 2)))
     angles = [x for w in (a, b) for x in (np.arccos(w[:, 2]), np.arctan2(w[:, 1], w[:, 0]))]
     rows = np.column_stack([*angles, builtin(NAMES[0]).eval(a, b), np.zeros(60)])

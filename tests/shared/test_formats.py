@@ -59,10 +59,6 @@ def _vectors(triple):
     return mi.Vector3f(*(w.astype(np.float32).ravel() if isinstance(w, np.ndarray) else w for w in triple))
 
 
-def psnr(reference, candidate):
-    return compare_on_sphere(reference, [candidate], default_environment(), size=128)[0].metrics["psnr_object_db"]
-
-
 class Held(Brdf):
     """What a table could hold of a material, if it had a cell for each pair of directions."""
 
@@ -84,8 +80,9 @@ def test_rgl_as_a_table():
 def test_stand_ins_as_rgl_files(stand_in, tmp_path, name):
     source = load(stand_in(name))
     rgl_export.write(source, tmp_path / "x.bsdf")
-    assert psnr(source, rgl.read(tmp_path / "x.bsdf")) >= 45
-    assert psnr(source, InMitsuba(tmp_path / "x.bsdf")) >= 45
+    readers = rgl.read(tmp_path / "x.bsdf"), InMitsuba(tmp_path / "x.bsdf")
+    found = compare_on_sphere(source, readers, default_environment(), size=128)
+    assert min(each.metrics["psnr_object_db"] for each in found) >= 45
 
 
 # Of planes with tricube weights alone, over θ_d: what single samples that are held out must not be worse than

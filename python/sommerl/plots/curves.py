@@ -44,6 +44,7 @@ def lobes(ax: Any, brdf: Materials, theta_i: Sequence[float] = INCIDENCES) -> No
     ax.set_theta_zero_location("N")
     ax.set_theta_direction(-1)
     ax.set_rscale("log")
+    ax.minorticks_off()  # of a radius, which nobody sees, and which take longer than all the rest
     for curve, style in zip(curves, STYLES, strict=False):
         for (theta_o, f_r), colour in zip(curve, colours(len(angles)), strict=True):
             ax.plot(theta_o, np.maximum(f_r, floor), color=colour, linestyle=style, linewidth=1.2)

@@ -68,6 +68,7 @@ def cut(ax: Any, samples: Samples, brdf: Brdf, theta_i: float, estimate: Estimat
     ax.set_theta_zero_location("N")
     ax.set_theta_direction(-1)
     ax.set_rscale("log")
+    ax.minorticks_off()  # of a radius, which nobody sees, and which take longer than all the rest
     ax.plot(theta, np.maximum(curve, floor), linewidth=1.0)
     if estimate is not None:
         factor = np.exp(estimate.deviation_at(np.broadcast_to(wi, wo.shape), wo))

@@ -5,6 +5,7 @@ This is for reading, and for comparison with the fast decoder in the core, which
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import accumulate
 
@@ -95,7 +96,7 @@ class Decoder:
         at = self._code // share
         if at >= upto[-1]:
             raise FormatError("stream: expected symbols of the range coder, found a code beyond all of them")
-        symbol = next(i for i, end in enumerate(upto) if end > at)
+        symbol = bisect_right(upto, at)
         self._code -= share * (upto[symbol] - weights[symbol])
         self._range = share * weights[symbol]
         while self._range < BOTTOM:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, bisect_right
+from collections.abc import Iterable
 
 FINE = 180
 OCTAVE, UNIT = 128, 64  # codes for a step of 1 in the coordinates of gains and of shapes
@@ -165,9 +166,7 @@ class Predictor:
     def predict(self, up: float, values: Floats, errors: Floats) -> None:
         """Makes a prediction. up, values: of the neighbours. errors: of earlier predictions at neighbouring nodes."""
         self._x = [value - up for value in values]
-        self._predicted = up
-        for w, x in zip(self._w, self._x, strict=True):
-            self._predicted += w * x
+        self._predicted = _product(self._w, self._x, up)
         total, count = 0.7 * self._level, 0.7
         for error in errors:
             total, count = total + error, count + 1.0
@@ -180,14 +179,12 @@ class Predictor:
     def learn(self, value: float) -> float:
         """Adapts to the true value; returns the absolute error of the prediction."""
         error, matrix, x = value - self._predicted, self._matrix, self._x
-        g = [_sum([matrix[i][j] * x[i] for i in NEIGHBOURS]) for j in NEIGHBOURS]
-        power = 1.0
+        g = [_product(column, x) for column in zip(*matrix, strict=True)]
+        r = _ratio(1.0, _product(g, x, 1.0))
         for i in NEIGHBOURS:
-            power += g[i] * x[i]
-        r = _ratio(1.0, power)
-        for i in NEIGHBOURS:
-            self._w[i] += g[i] * r * error
-            matrix[i] = [(entry - g[i] * g[j] * r) * FORGET for j, entry in enumerate(matrix[i])]
+            one = g[i]
+            self._w[i] += one * r * error
+            matrix[i] = [(entry - one * other * r) * FORGET for entry, other in zip(matrix[i], g, strict=True)]
         self._level = 0.98 * self._level + 0.02 * abs(error)
         return abs(error)
 
@@ -208,7 +205,7 @@ class Entries:
         reach = _ratio(REACH, s0)
         first, end = bisect_left(self._steps, _step(p0 - reach)), bisect_right(self._steps, _step(p0 + reach))
         self.reached += end - first
-        heights = [self._kernels(entry) for entry in range(first, end)]
+        heights = self._kernels(first, end)
         near, far = _sum4([near for near, _ in heights]), _sum4([far for _, far in heights])
         self._f, self._g = self._narrow / near, (1.0 - self._narrow) / far
         f, g = self._f * WHOLE, self._g * WHOLE
@@ -216,20 +213,23 @@ class Entries:
         weights[first:end] = [1 + _whole(near * f + far * g) for near, far in heights]
         return weights
 
-    def _kernels(self, entry: int) -> tuple[float, float]:
-        """The narrow and the wide kernel at an entry."""
+    def _kernels(self, first: int, end: int) -> list[tuple[float, float]]:
+        """The narrow and the wide kernel at the entries from the first one on, before the end."""
         p0, s0, p1, s1 = self._expected
-        x, y = (self._places[entry][0] - p0) * s0, (self._places[entry][1] - p1) * s1
-        x, y = x * x, y * y
-        a = (1.0 + x * 2.25) * (1.0 + y * 2.25)
-        b = (1.0 + x * 0.25) * (1.0 + y * 0.25)
-        a, b = a * a, b * b
-        c = self._roots[entry] / (a * b)
-        return c * b, c * a
+        heights: list[tuple[float, float]] = []
+        for (x, y), root in zip(self._places[first:end], self._roots[first:end], strict=True):
+            x, y = (x - p0) * s0, (y - p1) * s1
+            x, y = x * x, y * y
+            a = (1.0 + x * 2.25) * (1.0 + y * 2.25)
+            b = (1.0 + x * 0.25) * (1.0 + y * 0.25)
+            a, b = a * a, b * b
+            c = root / (a * b)
+            heights.append((c * b, c * a))
+        return heights
 
     def learn(self, entry: int) -> None:
         """Adapts to the entry that was picked."""
-        near, far = self._kernels(entry)
+        [(near, far)] = self._kernels(entry, entry + 1)
         near, far = near * self._f, far * self._g
         self._narrow = 0.96 * _ratio(near, near + far) + 0.02
         self._counts[entry] += 1.0
@@ -261,7 +261,7 @@ def _step(place: float) -> int:
 
 
 def _whole(x: float) -> int:
-    return 0 if math.isnan(x) else int(x)
+    return int(x) if x == x else 0  # it is not if it is no number
 
 
 def _ratio(a: float, b: float) -> float:
@@ -274,6 +274,13 @@ def _sum(values: Floats) -> float:
     total = 0.0
     for value in values:
         total += value
+    return total
+
+
+def _product(some: Iterable[float], others: Iterable[float], total: float = 0.0) -> float:
+    """The sum of products, one after the other, from a total on."""
+    for one, other in zip(some, others, strict=True):
+        total += one * other
     return total
 
 
