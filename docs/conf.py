@@ -12,6 +12,7 @@ HERE = Path(__file__).parent
 COLUMNS = "90"  # of what `--help` prints
 
 project = author = "Sommerl"
+copyright = "2026 The Sommerl developers; MIT licence"
 release = version = __version__
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
 myst_heading_anchors = 3

@@ -51,11 +51,11 @@ BUILT_IN = "Built-in materials (SGD stand-ins for measured ones):\n  " + "\n  ".
 EXAMPLES = """\
 Examples:
   sommerl demo
-  sommerl compress blue-metallic-paint.binary -o blue.smrl --clusters 256
-  sommerl info blue.smrl
-  sommerl compare blue-metallic-paint.binary blue.smrl
-  sommerl render --scene sphere blue.smrl -o blue.png
-  sommerl view blue-metallic-paint.binary blue.smrl
+  sommerl compress nickel -o nickel.smrl --target-size 2.7kB
+  sommerl info nickel.smrl
+  sommerl compare nickel nickel.smrl
+  sommerl render --scene sphere nickel.smrl -o nickel.png
+  sommerl view nickel nickel.smrl
 """
 
 

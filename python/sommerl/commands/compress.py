@@ -47,9 +47,9 @@ class CompressArguments(ReportArguments, ReadingArguments, MethodArguments):
 
 def arguments(add: Any) -> None:
     """Adds the command to the command line."""
-    summary = "Compresses materials by the paper's method (SOM-MAN) into .smrl files."
-    example = """sommerl compress nickel.binary -o nickel.smrl --clusters 1000
-  sommerl compress measured.bsdf -o measured.smrl --target-size 2.7kB
+    summary = "Compresses materials into .smrl files: to a size or a quality, or by the paper's method (SOM-MAN)."
+    example = """sommerl compress measured.bsdf -o measured.smrl --target-size 2.7kB
+  sommerl compress nickel.binary -o nickel.smrl --clusters 1000
   sommerl compress measured/ -o compressed/ --preset compact --target-psnr 50"""
     add_command(add, "compress", compress, CompressArguments, summary, example)
 
