@@ -38,9 +38,7 @@ LOWEST_PSNR, HIGHEST_PSNR = 20.0, 80.0  # dB: at 80, one 8-bit value in 1,500 di
 
 # The search for a quality
 FIRST_SIZE = 2000.0  # bytes: of RGL's seven materials, four reach DEFAULT_PSNR with 1,000 bytes, six with 2,700
-SLOPE = (
-    2.4  # dB for each doubling of the size, to guess the next size; a little more than usual, so that steps are small
-)
+SLOPE = 2.4  # dB for each doubling of the size, to guess the next one; more than usual, so that steps are small
 MARGIN = 0.1  # dB: the guess aims at this much more than what is wanted
 INNER = 0.2, 0.8  # the guess stays between these places in the range that is left, so each candidate narrows it
 MOST_TRIES = 7
