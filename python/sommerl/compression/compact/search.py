@@ -92,8 +92,7 @@ class CompactOptions:
             raise OptionError(f"target_psnr: expected {LOWEST_PSNR:g} to {HIGHEST_PSNR:g}, found {psnr}")
         if self.target_size is None and psnr is None:
             object.__setattr__(self, "target_psnr", DEFAULT_PSNR)
-        if not 1 <= self.effort <= len(efforts.EFFORTS):
-            raise OptionError(f"effort: expected 1 to {len(efforts.EFFORTS)}, found {self.effort}")
+        efforts.of(self.effort)
         if not 0 <= self.seed <= 2**64 - 1:
             raise OptionError(f"seed: expected 0 to {2**64 - 1}, found {self.seed}")
 
@@ -119,6 +118,9 @@ class Compressor:
     quality: gives a candidate's quality [dB]; if None, minus the least-squares error is used.
     step: called after the preparation and after each candidate.
     shared: lattices; sizes are then those of parts (`smrl.shared`), without what is shared.
+
+    Raises OptionError for an effort that is not from 1 to 9, MaterialError for a black BRDF, and for one that no shared
+    lattice can hold.
     """
 
     def __init__(
