@@ -57,6 +57,31 @@ def test_the_longest_names_work_and_errors_speak_of_the_file_meant(tmp_path):
         assert caught.value.filename == "/proc/x.smrl"
 
 
+def check_named(write, path, typed):
+    with pytest.raises(OSError, match="cannot be written") as caught:
+        write(path)
+    assert caught.value.filename == typed
+
+
+def test_errors_name_files_as_typed(tmp_path, monkeypatch):
+    """Relative, or the link that leads to it; also where the last step fails."""
+
+    def write(path):
+        with atomic_write(path):
+            pass
+
+    (tmp_path / "link").symlink_to("/proc/x.smrl")
+    monkeypatch.chdir("/proc")
+    for each in (check_writable, write):
+        check_named(each, Path("x.smrl"), "x.smrl")
+        check_named(each, tmp_path / "link", str(tmp_path / "link"))
+        must_fail(check_named, lambda path, each=each: each(path.resolve()), Path("x.smrl"), "x.smrl")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(os, "replace", lambda temporary, _: os.rmdir(temporary))
+    check_named(write, Path("y.smrl"), "y.smrl")
+    assert [each.name for each in tmp_path.iterdir()] == ["link"]
+
+
 def test_a_link_stays_a_link(tmp_path):
     (tmp_path / "link").symlink_to(tmp_path / "target")
     with replacing_files(overwrite=False):

@@ -19,6 +19,7 @@ from sommerl.factored import file as fbrdf
 from sommerl.factored.fit import FactorOptions, factor
 from sommerl.formats.load import load
 from sommerl.reflectance.origin import MOST_LINKS, source_of
+from sommerl.reflectance.reciprocal import reciprocal
 from sommerl.system.errors import FormatError
 from sommerl.system.sealed_file import PREFIX
 
@@ -100,6 +101,22 @@ def test_what_is_made_from_no_compressed_material_says_nothing():
         encode = fbrdf.encode if name.endswith(".fbrdf") else file.encode
         again = (fbrdf if name.endswith(".fbrdf") else file).decode(encode(before))
         assert (again.source.sha256, again.source.made_from) == (before.source.sha256, ())
+
+
+def check_same_source(made):
+    """That the mean of both orders of a compressed material says the same of its source as the material."""
+    before = load(GOLDEN / "factored.fbrdf")
+    assert (source_of(made), made.kind) == (source_of(before), before.kind)
+
+
+def test_of_a_mean_of_both_orders(tmp_path):
+    mean = reciprocal(load(GOLDEN / "factored.fbrdf"))
+    check_same_source(mean)
+    material, _ = search.compress(mean, CompactOptions(target_size=900, effort=1))
+    save(material, tmp_path / "x.smrl")
+    check_made_from(load(tmp_path / "x.smrl"), GOLDEN / "factored.fbrdf", "factored")
+    mean.file_sha256 = ""
+    must_fail(check_same_source, mean)
 
 
 def test_one_that_was_never_a_file():

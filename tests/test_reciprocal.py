@@ -7,8 +7,9 @@ from rgl_files import content
 
 from sommerl import builtin, load
 from sommerl.formats.rgl import RglBrdf
+from sommerl.reflectance import distance
 from sommerl.reflectance.brdf import Brdf
-from sommerl.reflectance.distance import asymmetry, negative_share, sidedness
+from sommerl.reflectance.distance import asymmetry, moved_share, negative_share, sidedness
 from sommerl.reflectance.gamut import without_negatives
 from sommerl.reflectance.reciprocal import EVEN, reciprocal
 
@@ -81,13 +82,34 @@ def test_sidedness_and_negative_shares():
     """f = 1 + x with x from -1 to 1, where y of the half vector's cross product changes the sign of x: by hand, of a
     BRDF that is 1 on one side and 0 on the other the difference is twice the mean."""
 
-    def one_side(wi, wo):
-        left = (wi[0] * wo[1] - wi[1] * wo[0] > 0).astype(float)
-        return left, left, left
-
-    assert sidedness(one_side) == pytest.approx(2)
+    assert sidedness(lambda wi, wo: (left(wi, wo),) * 3) == pytest.approx(2)
     assert sidedness(lambda wi, wo: (wi[2], wo[2], wi[2])) == pytest.approx(0, abs=1e-12)
     assert negative_share(lambda wi, wo: (0 * wi[2] - 1, 0 * wi[2] + 3, 0 * wi[2])) == pytest.approx(1 / 4)
+
+
+def left(wi, wo):
+    """Whether light comes from the left of the viewer's plane: 1 or 0."""
+    return (wi[0] * wo[1] - wi[1] * wo[0] > 0).astype(float)
+
+
+def check_sides(negative, moved):
+    """By hand, of what is -1 on one side and 2 on the other; and of a change from 1 to 1.5 where 2 is on the other."""
+    for light in (left, lambda wi, wo: 1 - left(wi, wo)):
+        assert negative(lambda wi, wo, light=light: (2 - 3 * light(wi, wo),) * 3) == pytest.approx(1 / 3)
+
+        def before(wi, wo, buffers, light=light):
+            return (2 - light(wi, wo),) * 3
+
+        def after(wi, wo, buffers, light=light):
+            return (2 - 0.5 * light(wi, wo),) * 3
+
+        assert moved(before, after, {}) == pytest.approx(0.5 / 3)
+
+
+def test_shares_are_of_both_sides(monkeypatch):
+    check_sides(negative_share, moved_share)
+    monkeypatch.setattr(distance, "SYMMETRIC", np.inf)  # as if both sides of everything were alike
+    must_fail(check_sides, negative_share, moved_share)
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -4,11 +4,12 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import contextmanager
 
 import pytest
 from helpers import must_fail, run
 
-from sommerl.system import threads
+from sommerl.system import jit, threads
 from sommerl.system.errors import OptionError
 
 # Runs some work, and meanwhile looks how many threads run or wait for a processor at the same time, other than the one
@@ -107,6 +108,34 @@ def test_that_check_notices_more_threads(tmp_path):
     found = work("lookup", None, tmp_path)
     assert found[1] == [None] * len(threads.POOLS)
     must_fail(check_limited, [found[0], ["1"] * len(threads.POOLS)], 1)
+
+
+def check_never_more(limited):
+    """Dr.Jit, where the limit is above, at and below the number of threads that it has; and that it then has those that
+    it needs."""
+    dr = jit.drjit()
+    before = dr.thread_count()
+    for limit in (before + 3, before, 1):
+        os.environ[threads.VARIABLE] = str(limit)
+        with limited():
+            assert dr.thread_count() == min(limit, before)
+        assert dr.thread_count() == min(before, max(limit, jit.LEAST_THREADS))
+
+
+def test_dr_jit_is_limited_and_never_given_more(monkeypatch):
+    monkeypatch.setenv(threads.VARIABLE, "")
+    before = jit.drjit().thread_count()
+
+    @contextmanager
+    def all_of_them():
+        jit.drjit().set_thread_count(threads.limit())
+        yield
+
+    try:
+        check_never_more(jit.limited)
+        must_fail(check_never_more, all_of_them)
+    finally:
+        jit.drjit().set_thread_count(before)
 
 
 WRONG = ("0", "257", "-1", "1.5", "abc", " 2", "1e1", "²", "9" * 30, "+1")

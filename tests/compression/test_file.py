@@ -471,6 +471,21 @@ def test_an_index_of_another_type_is_refused(small_table):
             SomManBrdf(np.ones((1, 3)), np.zeros(SMALL.shape, dtype), SMALL, name="x")
 
 
+def check_found(index, largest):
+    with pytest.raises(MaterialError, match=f"expected indices below 1, found {largest}$"):
+        SomManBrdf(np.ones((1, 3)), index, SMALL, name="x")
+
+
+def test_an_index_beyond_the_lut_is_refused_and_named():
+    """But for cells below the horizon, which are not read."""
+    index = np.where(SMALL.above_horizon, 0, 9).astype(np.uint8)
+    assert SomManBrdf(np.ones((1, 3)), index, SMALL, name="x").index.max() == 0
+    index[0, 0, 0] = 5
+    check_found(index, 5)
+    with pytest.raises(AssertionError):
+        check_found(index, 9)
+
+
 def test_sizes_are_counted_as_stated():
     assert cells().bytes_paper == 4 * SMALL.size + 24 * 9
     assert cells().bytes_memory == SMALL.size + 9 * 24

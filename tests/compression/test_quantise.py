@@ -12,7 +12,7 @@ from sommerl.compression.compact import effort as efforts
 from sommerl.compression.compact import search
 from sommerl.compression.compact.lattice_fit import Fitter
 from sommerl.compression.compact.quantise import Quantised, quantise
-from sommerl.compression.compact.search import CompactOptions, compress
+from sommerl.compression.compact.search import CompactOptions, Compressor, compress
 from sommerl.compression.smrl import file
 from sommerl.compression.smrl.codes import coordinates, gain_codes, gain_values, shape_codes, shape_values
 from sommerl.reflectance.nodes import NodeLattice
@@ -251,6 +251,12 @@ def test_a_quality_out_of_reach(monkeypatch):
 def test_bad_options(options, sentence):
     with pytest.raises(OptionError, match=sentence):
         CompactOptions(**options)
+
+
+@pytest.mark.parametrize("effort", [0, 10])
+def test_no_such_effort(effort):
+    with pytest.raises(OptionError, match=f"effort: expected 1 to 9, found {effort}"):
+        Compressor(builtin("nickel"), effort=effort)
 
 
 def test_a_psnr_needs_somebody_who_measures():

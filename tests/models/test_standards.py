@@ -143,7 +143,9 @@ def test_of_reciprocity_no_more_is_said_than_holds(model):
 def test_inputs_are_checked(model):
     good = material(model, 0).values
     name = next(iter(good))
-    for bad in ({name: good[name]}, good | {"x": 1.0}, good | {name: (2.0, 0.0, 0.0)}, good | {name: (0.5,)}):
+    number = next(key for key, chosen in model.by_key.items() if not chosen.colour)
+    more = [good | {name: 0.5}, good | {number: (0.5, 0.5, 0.5)}, good | {number: math.nan}]
+    for bad in ({name: good[name]}, good | {"x": 1.0}, good | {name: (2.0, 0.0, 0.0)}, good | {name: (0.5,)}, *more):
         with pytest.raises(MaterialError, match=model.name):
             Surface("", model, bad)
 

@@ -87,8 +87,9 @@ class Reflectances(Palette):
         if index.shape != cells.shape or index.dtype.kind != "u":
             found = f"{index.dtype} of shape {index.shape}"
             raise MaterialError(f"{name}: expected an unsigned index of shape {cells.shape}, found {found}")
-        if index[cells.above_horizon].max() >= len(self.lut):
-            raise MaterialError(f"{name}: expected indices below {len(self.lut)}, found {index.max()}")
+        largest = index[cells.above_horizon].max()  # of the others, nothing is read
+        if largest >= len(self.lut):
+            raise MaterialError(f"{name}: expected indices below {len(self.lut)}, found {largest}")
         return cells.extended(index.astype(np.uint8 if len(self.lut) <= 256 else np.uint16))
 
     def stored(self, index: NDArray[Any]) -> NDArray[np.float64]:

@@ -52,7 +52,8 @@ def factor(brdf: Brdf, options: FactorOptions | None = None, *, progress: Progre
     As in Lawrence et al. (2004), the matrix of elevations by half vectors is factored first, and then each lobe's table
     of θ_h by φ_h. Rows and columns are scaled so that dark ones count, too. Our own addition are the iterations after
     that, which improve all factors together. Half vectors that mirror the viewer below the horizon are fitted to 0, so
-    that samplers draw few of them, but with a small weight, since no evaluation reads them.
+    that samplers draw few of them, but with a small weight, since no evaluation reads them. Only light from one side of
+    the viewer's plane is looked at: factors give the same for the other side, whatever the BRDF does there.
 
     progress: called with the iterations done and the iterations in all. Raises MissingDependencyError without
     scikit-learn.

@@ -39,6 +39,8 @@ class FactoredBrdf(Brdf):
         kept in half precision, as a file holds them. A value belongs to the middle of its interval; between middles
         they are interpolated linearly.
     scale: a factor for each term [1/sr], (J, K). changed: in the source, of what was just factored; no file keeps it.
+        Its `cells_clamped` counts pairs of directions, and its `energy_clamped` is a share of f_r max(cos θ_i, C), each
+        pair of the fit counted alike.
     """
 
     kind = "factored"

@@ -55,9 +55,8 @@ class Objective:
         self.linear = self._domain.linear
         wi, wo = (tuple(self._float(component.copy()) for component in split(w)) for w in (samples.wi, samples.wo))
         self._angles = a = Angles(wi, wo)
-        self._dr.eval(
-            a.cos_h, a.sin_h, a.tan2_h, a.theta_h, a.cos_d, a.along
-        )  # computed once, not again for every lobe
+        # Computed once, not again for every lobe.
+        self._dr.eval(a.cos_h, a.sin_h, a.tan2_h, a.theta_h, a.cos_d, a.along)
         self._owner = [lobe for lobe, family in enumerate(families) for _ in family.parameters]
         self._weight = self._domain.weight(a.cos_i)
         measured = [self._float(channel.copy()) * self._weight for channel in samples.f_r.T]

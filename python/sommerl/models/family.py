@@ -102,9 +102,8 @@ class Angles:
     @cached_property
     def cos_h(self) -> Array:
         f = ops(self.theta_h)
-        return f.maximum(
-            f.cos(self.theta_h), 1e-7
-        )  # in single precision, π/2 is rounded up, and its cosine is negative
+        # In single precision, π/2 is rounded up, and its cosine is negative.
+        return f.maximum(f.cos(self.theta_h), 1e-7)
 
     @cached_property
     def sin_h(self) -> Array:

@@ -78,8 +78,8 @@ class Surface(Brdf):
             raise MaterialError(f"{model.name}: expected inputs {sorted(expected)}, found {sorted(values)}")
         for key, value in values.items():
             chosen = expected[key]
-            numbers = list(value) if chosen.colour else [value]
-            if len(numbers) != chosen.count or not all(chosen.low <= x <= chosen.high for x in numbers):
+            numbers, shape = np.asarray(value), (3,) if chosen.colour else ()
+            if numbers.shape != shape or not ((chosen.low <= numbers) & (numbers <= chosen.high)).all():
                 what = "three numbers" if chosen.colour else "a number"
                 raise MaterialError(
                     f"{model.name}: {key}: expected {what} from {chosen.low:g} to {chosen.high:g}, found {value}"

@@ -53,7 +53,7 @@ class NodeLattice(AnyLattice):
 
     def __post_init__(self) -> None:
         bands = sorted(set(self.band))
-        whole = all(_spans(axis, FINE) for axis in (self.theta_h, *self.theta_d))
+        whole = all(_spans(axis) for axis in (self.theta_h, *self.theta_d))
         phi_d = all(_turns_back(axis) if self.mirrored else _turns(axis) for axis in self.phi_d)
         counted = len(self.band) == len(self.theta_h) and bands == list(range(len(self.theta_d)))
         if not (whole and phi_d and counted and len(self.theta_d) == len(self.phi_d)):
@@ -179,8 +179,8 @@ def _increases(axis: tuple[int, ...]) -> bool:
     return all(a < b for a, b in pairwise(axis))
 
 
-def _spans(axis: tuple[int, ...], end: int) -> bool:
-    return len(axis) > 1 and axis[0] == 0 and axis[-1] == end and _increases(axis)
+def _spans(axis: tuple[int, ...]) -> bool:
+    return len(axis) > 1 and axis[0] == 0 and axis[-1] == FINE and _increases(axis)
 
 
 def _turns(axis: tuple[int, ...]) -> bool:
@@ -188,7 +188,7 @@ def _turns(axis: tuple[int, ...]) -> bool:
 
 
 def _turns_back(axis: tuple[int, ...]) -> bool:
-    return axis == (0,) or _spans(axis, FINE)
+    return axis == (0,) or _spans(axis)
 
 
 def _whole(axis: tuple[int, ...]) -> tuple[int, ...]:

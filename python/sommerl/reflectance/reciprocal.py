@@ -40,16 +40,24 @@ def reciprocal(brdf: Brdf) -> Brdf:
 
 
 class ReciprocalBrdf(Brdf):
-    """The mean of both orders of the directions of another BRDF: see `reciprocal`."""
-
-    kind = "measurement"
+    """The mean of both orders of the directions of another BRDF: see `reciprocal`. It is of the other's kind, and what
+    is made from it counts as made from the other.
+    """
 
     def __init__(self, brdf: Brdf) -> None:
         self._one_sided = brdf
-        self.name, self.source = brdf.name, brdf.source
+        self.name, self.source, self.file_sha256 = brdf.name, brdf.source, brdf.file_sha256
         self._factors = np.ones(VIEWERS)
         self._factors = self._bounded()
         del self.sampler  # of what was not bounded yet
+
+    @property
+    def kind(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride] # that of an object, here
+        return self._one_sided.kind
+
+    @property
+    def compressed(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return self._one_sided.compressed
 
     @property
     def signed(self) -> bool:

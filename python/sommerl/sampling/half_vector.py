@@ -254,9 +254,8 @@ def _probabilities(brdf: Brdf) -> NDArray[np.float64]:
     even: NDArray[np.float64] = cosine[::2].mean(axis=-1)
     total = bounded.sum(axis=(1, 2), keepdims=True)
     even /= even.sum(axis=(1, 2), keepdims=True)
-    glossy = np.where(
-        total > 0, bounded / _positive(total), even
-    )  # where a viewer gets no light at all, the cosine alone
+    # Where a viewer gets no light at all, the cosine alone.
+    glossy = np.where(total > 0, bounded / _positive(total), even)
     return ((1 - DIFFUSE) * glossy + DIFFUSE * even).reshape(ELEVATIONS, CELLS)
 
 

@@ -93,7 +93,7 @@ def atomic_write(path: Path) -> Generator[BinaryIO]:
     remove_left_over(target)
     temporary = None
     try:
-        with _named(target):
+        with _named(path):
             with hold_interrupts():
                 temporary = _opened(target)
             yield temporary.out
@@ -104,7 +104,8 @@ def atomic_write(path: Path) -> Generator[BinaryIO]:
                 raise OSError(
                     errno.EEXIST, "cannot be written (another file or folder has taken its name meanwhile)", str(path)
                 )
-            temporary.take_place(target)
+            with _named(path):
+                temporary.take_place(target)
     finally:
         if temporary:
             with hold_interrupts():
@@ -125,7 +126,7 @@ def check_writable(path: Path) -> None:
         folder = target.parent if path.is_symlink() else path.parent  # as typed
         raise FileNotFoundError(errno.ENOENT, f"cannot be written: there is no folder {folder}", str(path))
     remove_left_over(target)
-    with _named(target), tempfile.TemporaryFile(dir=target.parent):
+    with _named(path), tempfile.TemporaryFile(dir=target.parent):
         pass
 
 
@@ -209,11 +210,10 @@ class _Temporary:
             umask = os.umask(0)
             os.umask(umask)
             mode = 0o666 & ~umask  # mkstemp makes files that only their owner can read, unlike `open`
-        with _named(target):
-            os.chmod(self.path, mode)
-            if sys.platform == "win32":
-                self.out.close()
-            os.replace(self.path, target)
+        os.chmod(self.path, mode)
+        if sys.platform == "win32":
+            self.out.close()
+        os.replace(self.path, target)
         temporaries.discard(self.path)
 
     def discard(self) -> None:
@@ -265,7 +265,7 @@ def _remove_if_left(temporary: str) -> None:
 
 @contextmanager
 def _named(path: Path) -> Generator[None]:
-    """Makes errors name the file to be written instead of its temporary file."""
+    """Makes errors name the file to be written, as typed, instead of its temporary file."""
     try:
         yield
     except OSError as error:

@@ -46,14 +46,14 @@ def limited() -> Generator[None]:
     """Within the block, Dr.Jit uses no more threads than the limit, even if that is 1 (see LEAST_THREADS)."""
     dr, threads = drjit(), limit()
     before = dr.thread_count()
-    if threads is None or threads == before:
+    if threads is None or threads >= before:
         yield
         return
     dr.set_thread_count(threads)
     try:
         yield
     finally:
-        dr.set_thread_count(max(LEAST_THREADS, threads))
+        dr.set_thread_count(before)
 
 
 def float64() -> Any:

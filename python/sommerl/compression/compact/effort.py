@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ...system.errors import OptionError
+
 
 @dataclass(frozen=True)
 class Effort:
@@ -37,7 +39,9 @@ DEFAULT = 5
 
 
 def of(number: int) -> Effort:
-    """Effort `number`, from 1 to 9."""
+    """Effort `number`, from 1 to 9. Raises OptionError for another."""
+    if not 1 <= number <= len(EFFORTS):
+        raise OptionError(f"effort: expected 1 to {len(EFFORTS)}, found {number}")
     return EFFORTS[number - 1]
 
 

@@ -14,6 +14,7 @@ from ...reflectance.brdf import Brdf
 from ...reflectance.half_diff import directions
 from ...reflectance.nodes import NodeLattice, angles_at
 from ...sampling.half_vector import albedo
+from .source import node_places
 
 # Of viewers, closer together where albedos change fastest
 ANGLES = np.radians((0, 10, 20, 30, 40, 50, 60, 68, 74, 78, 81, 84, 86, 87, 88, 88.5, 89, 89.3, 89.5))
@@ -52,7 +53,7 @@ def at_nodes(factors: Floats, lattice: NodeLattice) -> Floats:
     """The factors for a lattice's nodes, (nodes): that of the viewer's angle, and on a reciprocal lattice that of the
     light's if it is smaller. factors: as from `EnergyBound`.
     """
-    wi, wo = _node_directions(lattice)
+    wi, wo = directions(*angles_at(*node_places(lattice), **lattice.folds))
     seen = _at(factors, wo)
     return np.minimum(seen, _at(factors, wi)) if lattice.reciprocal else seen
 
@@ -61,12 +62,3 @@ def _at(factors: Floats, w: Triple) -> Floats:
     theta: Floats = np.arctan2(np.hypot(w[0], w[1]), w[2])
     found: Floats = np.interp(theta, ANGLES, factors)
     return found
-
-
-def _node_directions(lattice: NodeLattice) -> tuple[Triple, Triple]:
-    """The pair of directions of each node."""
-    places = [
-        np.stack(np.meshgrid([float(x)], lattice.theta_d[b], lattice.phi_d[b], indexing="ij")).reshape(3, -1)
-        for x, b in zip(lattice.theta_h, lattice.band, strict=True)
-    ]
-    return directions(*angles_at(*np.concatenate(places, axis=1), **lattice.folds))

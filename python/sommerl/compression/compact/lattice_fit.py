@@ -79,9 +79,8 @@ class SharedFitter:
         fitting = [each for each in shared.lattices if all(allowed[name] or not on for name, on in each.folds.items())]
         if not fitting:
             raise MaterialError(f"{brdf.name}: none of the shared lattices can hold it, since they fold φ_d")
-        sources: dict[
-            tuple[bool, ...], FittedSource
-        ] = {}  # lattices that fold φ_d alike are fitted to the same directions
+        # Lattices that fold φ_d alike are fitted to the same directions.
+        sources: dict[tuple[bool, ...], FittedSource] = {}
         found: list[tuple[Problem, float]] = []
         for lattice in fitting:
             folds = tuple(lattice.folds.values())

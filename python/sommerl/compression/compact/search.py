@@ -38,9 +38,7 @@ LOWEST_PSNR, HIGHEST_PSNR = 20.0, 80.0  # dB: at 80, one 8-bit value in 1,500 di
 
 # The search for a quality
 FIRST_SIZE = 2000.0  # bytes: of RGL's seven materials, four reach DEFAULT_PSNR with 1,000 bytes, six with 2,700
-SLOPE = (
-    2.4  # dB for each doubling of the size, to guess the next size; a little more than usual, so that steps are small
-)
+SLOPE = 2.4  # dB for each doubling of the size, to guess the next one; more than usual, so that steps are small
 MARGIN = 0.1  # dB: the guess aims at this much more than what is wanted
 INNER = 0.2, 0.8  # the guess stays between these places in the range that is left, so each candidate narrows it
 MOST_TRIES = 7
@@ -94,8 +92,7 @@ class CompactOptions:
             raise OptionError(f"target_psnr: expected {LOWEST_PSNR:g} to {HIGHEST_PSNR:g}, found {psnr}")
         if self.target_size is None and psnr is None:
             object.__setattr__(self, "target_psnr", DEFAULT_PSNR)
-        if not 1 <= self.effort <= len(efforts.EFFORTS):
-            raise OptionError(f"effort: expected 1 to {len(efforts.EFFORTS)}, found {self.effort}")
+        efforts.of(self.effort)
         if not 0 <= self.seed <= 2**64 - 1:
             raise OptionError(f"seed: expected 0 to {2**64 - 1}, found {self.seed}")
 
@@ -121,6 +118,9 @@ class Compressor:
     quality: gives a candidate's quality [dB]; if None, minus the least-squares error is used.
     step: called after the preparation and after each candidate.
     shared: lattices; sizes are then those of parts (`smrl.shared`), without what is shared.
+
+    Raises OptionError for an effort that is not from 1 to 9, MaterialError for a black BRDF, and for one that no shared
+    lattice can hold.
     """
 
     def __init__(

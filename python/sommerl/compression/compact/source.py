@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ... import _core
 from ...reflectance.arrays import Triple, split
 from ...reflectance.brdf import Brdf
-from ...reflectance.distance import asymmetry, sidedness
+from ...reflectance.distance import SYMMETRIC, asymmetry, sidedness
 from ...reflectance.half_diff import directions
 from ...reflectance.nodes import ABOVE, BELOW, FINE, KNEE, SMALLEST_COSINE, NodeLattice, angles_at, damped, place
 from ...reflectance.samples import Samples
@@ -35,9 +35,6 @@ Array = NDArray[np.float64]
 DIRECTIONS_A_NODE = 36
 # Powers of the solid angle and of the cosines in the weights (docs/compact.md)
 SOLID_POWER, COSINE_POWER = 0.75, 0.25
-# A source that differs by less (`distance.sidedness`, `distance.asymmetry`) is taken for mirrored, or for reciprocal;
-# between sides RGL's files differ by 10⁻⁵ at most, between orders by 4 % at least
-SYMMETRIC = 1e-3
 LOWEST_COSINE = 1e-4  # closer to the horizon, no directions are drawn: f_r may have no bound there
 RIDGE = 0.05  # of the median of the matrix's diagonal; 0.5 costs 0.5 and 1.3 dB, 0.005 gains 0.5 and 0.7 dB
 # Of all samples together, in units of all random directions together
