@@ -173,14 +173,14 @@ def test_png_is_the_srgb_of_the_film(capsys, tmp_path, scene):
 
 def test_a_crop_is_rendered_as_one(capsys, tmp_path, monkeypatch):
     """In several passes, as the whole is."""
-    monkeypatch.setattr(passes, "SAMPLES_A_PASS", 12 * 10 * 1024)
+    monkeypatch.setattr(passes, "SAMPLES_A_PASS", 12 * 10 * 2**13)
     path = write_scene(tmp_path / "scene.xml", filter="gaussian")
     crop = {"crop_width": 5, "crop_height": 4, "crop_offset_x": 4, "crop_offset_y": 3}
     numbers = "".join(f'<integer name="{name}" value="{value}"/>' for name, value in crop.items())
     border = '<boolean name="sample_border" value="true"/>'
-    run_json(capsys, "render", path, "-o", tmp_path / "whole.exr", "--spp", 16384)
+    run_json(capsys, "render", path, "-o", tmp_path / "whole.exr", "--spp", 2**16)
     path.write_text(path.read_text().replace("<rfilter", f"{numbers}{border}<rfilter"))
-    assert run_json(capsys, "render", path, "-o", tmp_path / "x.exr", "--spp", 16384)["size"] == [5, 4]
+    assert run_json(capsys, "render", path, "-o", tmp_path / "x.exr", "--spp", 2**16)["size"] == [5, 4]
     whole = picture(tmp_path / "whole.exr")[3:7, 4:9]
     assert np.mean(picture(tmp_path / "x.exr")) == pytest.approx(whole.mean(), rel=0.02)
 
