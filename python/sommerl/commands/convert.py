@@ -115,7 +115,7 @@ def converted(brdf: Brdf, kind: Format, options: ConvertArguments, command: str 
     output: Path = options.output
     kept = reciprocal(brdf) if options.reciprocal else brdf
     report = {} if kind.names_source else _report(brdf, output)
-    check_samples(options, brdf, options.input)
+    check_samples(options, brdf, options.input, output)
     warn_of_samples(brdf, options.input)
     if kind is smrl.FORMAT and options.target_size is not None:
         result = compact_one(
@@ -207,6 +207,10 @@ def checked(options: ConvertArguments) -> Format:
         raise OptionError("--noise: expected an output that holds the material, found a scene snippet")
     if options.reciprocal and kind and kind.names_source:
         raise OptionError("--reciprocal: expected an output that holds the material, found a scene snippet")
+    if options.residuals is not None and (len(options.inputs) > 1 or is_several(options.input)):
+        raise OptionError("--residuals: expected one material, found several")
+    if options.residuals is not None and kind and (kind.names_source or not kind.read):
+        raise OptionError(f"--residuals: expected an output that can be read again, found {options.output}")
     if options.target_size is not None:
         _compact(options)
         if not (kind and kind.compressed):
