@@ -15,6 +15,7 @@ from ..compression.paper.options import TrainOptions
 from ..formats import registry, rgl, rgl_export, smrl, source_code, texture
 from ..formats.format import Format
 from ..formats.load import load
+from ..formats.names import split_member
 from ..formats.scattered import ScatteredBrdf
 from ..models.builtin import NAMES, builtin_table
 from ..plots import coverage
@@ -246,13 +247,19 @@ def typed(words: Sequence[str], options: ConvertArguments) -> str:
 
     words: those after `sommerl`. To them, the options that what is written depends on are added.
     """
-    words = ["sommerl", *(Path(each).name or each for each in words)]
+    words = ["sommerl", *map(_without_folder, words)]
     for each in fields(options):
         value = getattr(options, each.name)
         if each.name in OF_CONTENT and value != each.default:
             text = ",".join(options.columns or ()) if each.name == "columns" else str(value)
             words += [flag(each.name)] if value is True else [flag(each.name), text]
     return join(words)
+
+
+def _without_folder(word: str) -> str:
+    """A word that may name a file, or a material in one, whose own name may have slashes."""
+    path, member = split_member(word)
+    return f"{path.name}:{member}" if member else path.name or word
 
 
 def _compressed(brdf: Brdf, options: ConvertArguments) -> SomManBrdf:
