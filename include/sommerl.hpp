@@ -345,13 +345,14 @@ public:
         }
         return false;
     }
-private:
-    static bool is_in(std::string_view characters, char c) { return characters.find(c) != std::string_view::npos; }
+    /// The characters of a text in UTF-8.
     static std::size_t length(std::string_view text) {
         std::size_t count = 0;
         for (const char c : text) count += (static_cast<unsigned char>(c) & 0xc0) != 0x80;
         return count;
     }
+private:
+    static bool is_in(std::string_view characters, char c) { return characters.find(c) != std::string_view::npos; }
     std::size_t digits() {
         std::size_t count = 0;
         for (; !text_.empty() && text_[0] >= '0' && text_[0] <= '9'; ++count) text_.remove_prefix(1);
@@ -1566,7 +1567,7 @@ private:
         int parts = 0;
         const auto metric = [&] {
             std::string_view name;
-            bool fine = json.string(name) && name.size() <= 100 && metrics_.size() < 64;
+            bool fine = json.string(name) && detail::Json::length(name) <= 100 && metrics_.size() < 64;
             for (const std::string& other : metrics_) fine = fine && other != name;
             return metrics_.emplace_back(name), fine;
         };

@@ -4,6 +4,7 @@ import hashlib
 import io
 import struct
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 from sommerl.compression.smrl import file
@@ -89,3 +90,18 @@ def folder(path, materials=MATERIALS, **colours):
         )  # fmt: skip
     index.write_index(path, records)
     return path
+
+
+def with_metric(name):
+    """The bytes of a library whose only material has one metric, which may have a name that the writer refuses."""
+    out = io.BytesIO()
+    write(out, [replace(entry("cells"), metrics={"?": 1.0})], MATERIALS.__getitem__)
+    sections, head, payload = apart(out.getvalue())
+    named = name.encode()
+    return together(
+        sections, [*head[:2], head[2] + len(named) - 1, *head[3:]], payload.replace(b'"?"', b'"%s"' % named)
+    )
+
+
+#: Names of metrics may have 100 characters, of any number of bytes.
+METRICS = [with_metric(100 * "é"), with_metric(101 * "é"), with_metric(100 * "e"), with_metric(101 * "e")]

@@ -11,7 +11,7 @@ from factored_brdfs import even
 from factored_brdfs import sealed as sealed_factors
 from headers import ERRORS, GOLDEN, HERE, cells, codes, compiled, output, probe, sharing
 from helpers import must_fail
-from library_files import apart, everything, together
+from library_files import METRICS, apart, everything, together
 
 from sommerl import Lattice
 from sommerl.compression.smrl import file
@@ -107,6 +107,13 @@ def test_broken_libraries_with_checksums_that_fit():
     found = codes(probe(), files)
     check_refuses_like_python(found, files, everything)
     assert found[-1] == "none"
+
+
+def test_long_names_of_metrics():
+    found = codes(probe(), METRICS)
+    check_refuses_like_python(found, METRICS, everything)
+    assert found == ["none", "notes"] * 2
+    must_fail(check_refuses_like_python, ["notes", *found[1:]], METRICS, everything)  # as bytes would be counted
 
 
 def with_notes(notes):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from headers import ERRORS, GOLDEN, KINDS, ROOT, asked, codes, output, pairs, sharing, written
 from helpers import must_fail, tool
+from library_files import METRICS
 from test_header import check_densities, check_facts, check_samples, check_values
 from test_header_refusals import FILES, check_reads_flat, check_refuses_like_python, small
 
@@ -96,6 +97,10 @@ def test_broken_files_with_a_checksum_that_fits(kind):
     files = [seal(each) for each in compact.broken(data[PREFIX.size :])]
     check_refuses_like_python(codes(example("probe"), files), files, read)
     must_fail(check_refuses_like_python, ["none"] * len(files), files, read)
+
+
+def test_long_names_of_metrics():
+    assert codes(example("probe"), METRICS) == ["none", "notes"] * 2
 
 
 def test_version_1():

@@ -210,6 +210,37 @@ def test_residuals_and_the_report_of_a_command(capsys, tmp_path):
     assert found["physics"]["mistakes"] == []
 
 
+def some_samples(path):
+    """A small table of samples."""
+    some = on_grid(FABRIC, 10.0, 30.0, 80.0)
+    rows = np.column_stack([*np.degrees([*polar_angles(some.wi), *polar_angles(some.wo)]), some.f_r])
+    np.savetxt(path, rows, "%.8g", ",", header="theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,r,g,b", comments="")
+
+
+def check_refused(capsys, output, residuals, *more):
+    """Whether residuals are refused before anything is written, and the option is named."""
+    some_samples(output.parent / "x.csv")
+    there = {path: path.read_bytes() for path in output.parent.iterdir() if path.is_file()}
+    code = main(["convert", str(output.parent / "x.csv"), *more, str(output), "--residuals", str(residuals)])
+    assert code == 2
+    assert "--residuals: expected" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in output.parent.iterdir() if path.is_file()} == there
+
+
+def test_residuals_are_not_written_over_the_output(capsys, tmp_path):
+    check_refused(capsys, tmp_path / "out.csv", tmp_path / "elsewhere" / ".." / "out.csv")
+    must_fail(check_refused, capsys, tmp_path / "out.csv", tmp_path / "other.csv")
+
+
+@pytest.mark.parametrize("name", ["out.h", "out.bin", "out.ktx2", "out.xml"])
+def test_residuals_need_an_output_that_can_be_read(capsys, tmp_path, name):
+    check_refused(capsys, tmp_path / name, tmp_path / "r.csv")
+
+
+def test_residuals_are_of_one_material(capsys, tmp_path):
+    check_refused(capsys, tmp_path / "out.glsl", tmp_path / "r.csv", "nickel")
+
+
 def test_residuals_need_samples(capsys, tmp_path):
     assert main(["convert", "nickel", str(tmp_path / "x.binary"), "--residuals", str(tmp_path / "r.csv")]) == 2
     assert "--residuals: expected a material of samples" in capsys.readouterr().err

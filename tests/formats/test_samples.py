@@ -153,6 +153,8 @@ def many_nan(count):
         (damaged(3, 5, "1,2"), "line 5: expected 7 columns, found 8"),
         (text(RADIANS, HEADER)[:-30], "line 61: expected 7 columns"),
         (text(RADIANS, HEADER + ",c"), "line 2: expected 8 columns, found 7"),
+        (damaged(0, 2, "1,2"), "line 2: expected 7 columns, found 8"),
+        (text(RADIANS, HEADER).replace("\n", "\n1,0,1,0,1\n", 1), "line 2: expected 7 columns, found 5"),
         (HEADER + "\n", "line 1: expected rows of numbers below the names"),
         (many_nan(20), r"at most 25% of the rows .*found 33%: 20 without numbers, .* in line 4 \(column g"),
         (text(RADIANS[:20], HEADER), "expected 32 to 2000000 samples, found 20"),
@@ -164,6 +166,10 @@ def test_bad_text(tmp_path, content, sentence):
     path.write_bytes(content.encode() if isinstance(content, str) else content)
     with pytest.raises(FormatError, match=rf"x\.csv: .*({sentence})"):
         load(path)
+
+
+def test_how_many_rows_there_are_is_no_row(parsed):
+    check_same(parsed(text(RADIANS, HEADER).replace("\n", "\n60\n", 1)))
 
 
 def test_a_column_of_words_is_ignored(parsed):

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from helpers import compact_material, lambertian_table, must_fail, run_json
+from library_files import packed
 from sampled import NODES
 from shader_programs import compact, run
 
@@ -67,6 +68,14 @@ def test_it_says_which_version_source_quality_and_command(capsys, tmp_path):
     ]
     check_head(text, lines)
     must_fail(check_head, text.replace(" --no-sampler", ""), lines)
+    assert str(tmp_path) not in text
+
+
+def test_a_material_of_a_library_keeps_its_name(capsys, tmp_path):
+    (tmp_path / "few.smrlib").write_bytes(packed())
+    run_json(capsys, "convert", f"{tmp_path / 'few.smrlib'}:nodes/both", tmp_path / "x.h")
+    text = (tmp_path / "x.h").read_text()
+    assert "// Command: sommerl convert few.smrlib:nodes/both x.h\n" in text
     assert str(tmp_path) not in text
 
 

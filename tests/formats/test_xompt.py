@@ -72,6 +72,42 @@ def test_directions_that_are_no_grid_are_samples(tmp_path):
     assert np.allclose(found.eval([0.3, 0, 0.954], [0, 0.2, 0.98]), 0.25, rtol=0.01)
 
 
+def check_meant(grid, factor, turned=0):
+    """Whether a grid has the values of SPECTRA times a factor, with the viewer's azimuth turned by so many points."""
+    expected = to_rgb(SPECTRA.reshape(-1, 3), NANOMETRES).reshape(3, 2, 4, 3) * factor
+    assert isinstance(grid, GridBrdf)
+    assert np.allclose(grid.values, np.roll(expected, turned, axis=2))
+
+
+QUARTERS = (THETA_I, THETA_O, np.radians([0.0, 90.0, 180.0, 270.0]))
+
+
+@pytest.mark.parametrize(
+    ("how", "factor", "turned"),
+    [
+        (Reading(), 1.0, 0),
+        (Reading(values="f_r-cos"), 1 / np.cos(THETA_O)[:, None, None], 0),
+        (Reading(values="reflectance-factor"), 1 / np.pi, 0),
+        (Reading(phi_from="specular"), 1.0, 2),
+    ],
+)
+def test_a_grid_is_read_as_it_is_asked_for(tmp_path, how, factor, turned):
+    """As samples that lie on no grid are."""
+    path = put(tmp_path, content(rows(QUARTERS)))
+    with reading(how):
+        check_meant(load(path), factor, turned)
+    if how != Reading():
+        must_fail(check_meant, load(path), factor, turned)
+
+
+def test_a_grid_is_samples_for_a_prior(tmp_path, monkeypatch):
+    monkeypatch.setattr(xompt, "from_samples", lambda samples, **_: len(samples.wi))  # which takes long
+    path = put(tmp_path, content(rows()))
+    with reading(Reading(prior=True)):
+        assert xompt.read(path) == SPECTRA[..., 0].size
+    check_grid(xompt.read(path), SPECTRA)
+
+
 def test_rows_without_numbers_are_left_out(tmp_path):
     table = [row for row in rows() if row[3] != PHI[1]] + [[550e-9, 0.1, 0.2, None, 1.0]]
     assert load(put(tmp_path, content(table))).facts["rows_without_numbers"] == 1

@@ -123,7 +123,10 @@ def test_a_disk_without_locks_is_told(folder, monkeypatch):
 
     monkeypatch.setattr(lock.fcntl, "lockf", refused)
     told = []
-    with locked(folder, WHOLE, told.append):
+    with locked(folder, WHOLE, told.append) as without:
         assert told == [
             f"{folder}: expected a file system with locks, found none: see to it that no other build writes here"
         ]
+        assert without.widened()  # and no error at the end of a build, which would leave it without an index
+        with pytest.raises(OSError, match="No locks"):
+            lock.Lock(0, works=True).widened()

@@ -87,7 +87,7 @@ def _compressed(
     source: str, output: Path, method: CompactOptions | TrainOptions, options: CompressArguments
 ) -> dict[str, Any]:
     brdf = load(source)
-    check_samples(options, brdf, source)
+    check_samples(options, brdf, source, output)
     warn_of_samples(brdf, source)
 
     def made(other: Brdf) -> Brdf:

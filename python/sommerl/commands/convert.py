@@ -15,6 +15,7 @@ from ..compression.paper.options import TrainOptions
 from ..formats import registry, rgl, rgl_export, smrl, source_code, texture
 from ..formats.format import Format
 from ..formats.load import load
+from ..formats.names import split_member
 from ..formats.scattered import ScatteredBrdf
 from ..models.builtin import NAMES, builtin_table
 from ..plots import coverage
@@ -115,7 +116,7 @@ def converted(brdf: Brdf, kind: Format, options: ConvertArguments, command: str 
     output: Path = options.output
     kept = reciprocal(brdf) if options.reciprocal else brdf
     report = {} if kind.names_source else _report(brdf, output)
-    check_samples(options, brdf, options.input)
+    check_samples(options, brdf, options.input, output)
     warn_of_samples(brdf, options.input)
     if kind is smrl.FORMAT and options.target_size is not None:
         result = compact_one(
@@ -207,6 +208,10 @@ def checked(options: ConvertArguments) -> Format:
         raise OptionError("--noise: expected an output that holds the material, found a scene snippet")
     if options.reciprocal and kind and kind.names_source:
         raise OptionError("--reciprocal: expected an output that holds the material, found a scene snippet")
+    if options.residuals is not None and (len(options.inputs) > 1 or is_several(options.input)):
+        raise OptionError("--residuals: expected one material, found several")
+    if options.residuals is not None and kind and (kind.names_source or not kind.read):
+        raise OptionError(f"--residuals: expected an output that can be read again, found {options.output}")
     if options.target_size is not None:
         _compact(options)
         if not (kind and kind.compressed):
@@ -242,13 +247,19 @@ def typed(words: Sequence[str], options: ConvertArguments) -> str:
 
     words: those after `sommerl`. To them, the options that what is written depends on are added.
     """
-    words = ["sommerl", *(Path(each).name or each for each in words)]
+    words = ["sommerl", *map(_without_folder, words)]
     for each in fields(options):
         value = getattr(options, each.name)
         if each.name in OF_CONTENT and value != each.default:
             text = ",".join(options.columns or ()) if each.name == "columns" else str(value)
             words += [flag(each.name)] if value is True else [flag(each.name), text]
     return join(words)
+
+
+def _without_folder(word: str) -> str:
+    """A word that may name a file, or a material in one, whose own name may have slashes."""
+    path, member = split_member(word)
+    return f"{path.name}:{member}" if member else path.name or word
 
 
 def _compressed(brdf: Brdf, options: ConvertArguments) -> SomManBrdf:

@@ -33,11 +33,18 @@ class ReportArguments(Arguments):
     )
 
 
-def check_samples(options: ReportArguments, brdf: Brdf, source: str) -> None:
-    """Raises OptionError or OSError for residuals of what has no samples, or that cannot be written."""
+def check_samples(options: ReportArguments, brdf: Brdf, source: str, output: Path) -> None:
+    """Raises OptionError or OSError for residuals of what has no samples, or that cannot be written.
+
+    output: what is made of the material, which residuals are not written over.
+    """
     if options.residuals is not None:
         if samples_of(brdf) is None:
             raise OptionError(f"--residuals: expected a material of samples, found another one ({source})")
+        if options.residuals.resolve() == output.resolve():
+            raise OptionError(f"--residuals: expected another file than the output, found {output}")
+        if output.exists() and not output.is_file():
+            raise OptionError(f"--residuals: expected an output that can be read again, found {output}")
         check_output(options.residuals, (".csv",), source)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from ..library.build import Hooks, Report, build
 from ..library.lock import WHOLE, Shard
 from ..library.record import Record
 from ..library.work import Method
-from ..render.judge import JUDGED, MOST
+from ..render.judge import JUDGED
 from ..system import threads
 from ..system.errors import OptionError
 from ..system.first_few import first_few
@@ -22,12 +21,12 @@ from . import answers, console
 from .arguments import named_as_typed, option, positional
 from .checks import check_range
 from .folders import make_folder
+from .library_rows import quality
 from .method_arguments import MethodArguments, chosen_method
 from .outcome import PartlyDone
 from .parser import add_command
 
 MOST_JOBS = 1024
-PICTURES = ("psnr_soft_db", "psnr_lamp_db")  # of which mean and worst are said
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,7 +120,7 @@ def _answer(folder: Path, report: Report) -> dict[str, Any]:
     totals: dict[str, Any] = {"output": str(folder), "made": len(report.made), "kept": len(report.kept)}
     totals |= {"failed": len(report.failed), "gone": report.gone, "removed": report.removed}
     totals |= {"bytes_before": before, "bytes_after": after, "ratio": before / after if after else None}
-    return answers.of_materials(materials, **totals, quality=_quality(records))
+    return answers.of_materials(materials, **totals, quality=quality({each.name: each.metrics for each in records}))
 
 
 def _described(folder: Path, record: Record, made: bool) -> dict[str, Any]:
@@ -133,18 +132,6 @@ def _described(folder: Path, record: Record, made: bool) -> dict[str, Any]:
     }
     about |= {"bytes_disk": record.bytes, "bytes_source": record.source_bytes, "source_sha256": record.source_sha256}
     return about | {"options": dict(record.options)} | dict(record.metrics)
-
-
-def _quality(records: Sequence[Record]) -> dict[str, Any]:
-    """Mean and worst of each PSNR, and the material that is the worst."""
-    found: dict[str, Any] = {}
-    for key in PICTURES:
-        values = {each.name: min(each.metrics[key], MOST) for each in records if key in each.metrics}
-        if values:
-            worst = min(values, key=lambda name: values[name])
-            mean = sum(values.values()) / len(values)
-            found[key] = {"mean": mean, "worst": values[worst], "worst_name": worst}
-    return found
 
 
 def _rows(answer: dict[str, Any]) -> dict[str, str]:

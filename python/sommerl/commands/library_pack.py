@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import fmean
 from typing import Any
 
 from ..library.library import Library
 from ..library.pack import EXTENSION, pack
-from ..library.share import LARGEST_PART, SMALLEST_PART, Packed, pack_shared
-from ..render.judge import MOST
+from ..library.share import LARGEST_PART, SMALLEST_PART, pack_shared
 from ..system.errors import OptionError
 from ..system.first_few import first_few
 from . import console
 from .arguments import WritingArguments, byte_count, named_as_typed, option, positional
 from .checks import check_output
+from .library_rows import PICTURES, quality
 from .parser import add_command
-
-PICTURES = {"psnr_soft_db": "in soft light", "psnr_lamp_db": "under one lamp"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,22 +69,14 @@ def _shared(options: PackArguments, library: Library, sources: Path, size: int) 
         done = pack_shared(library, sources, options.output, size, progress=advance)
     if done.whole:
         console.warn(f"{first_few(list(done.whole))}: as in the library, since no shared lattice can hold them")
-    quality = _quality(done)
+    measured = quality(done.metrics)
     if not options.json:
         each = done.bytes_disk / count
         said = f"{console.size(done.bytes_disk)}, {each:.0f} B each, of which {done.bytes_shared / count:.0f} B shared"
-        means = ", ".join(f"{quality[key]['mean']:.1f} dB {where}" for key, where in PICTURES.items() if key in quality)
+        means = ", ".join(
+            f"{measured[key]['mean']:.1f} dB {where}" for key, where in PICTURES.items() if key in measured
+        )
         console.say(f"{count} materials → {options.output} ({said}{'; ' + means if means else ''})")
     materials = [{"name": name} | dict(metrics) for name, metrics in done.metrics.items()]
     sizes = {"bytes_disk": done.bytes_disk, "bytes_shared": done.bytes_shared, "count": count}
-    return {"materials": materials, **sizes, "whole": dict(done.whole), "quality": quality}
-
-
-def _quality(done: Packed) -> dict[str, Any]:
-    """Mean and worst of each PSNR [dB], against the sources."""
-    found: dict[str, Any] = {}
-    for key in PICTURES if done.metrics else ():
-        values = {name: min(metrics[key], MOST) for name, metrics in done.metrics.items()}
-        worst = min(values, key=lambda name: values[name])
-        found[key] = {"mean": fmean(values.values()), "worst": values[worst], "worst_name": worst}
-    return found
+    return {"materials": materials, **sizes, "whole": dict(done.whole), "quality": measured}

@@ -16,6 +16,7 @@ from ..reflectance.lattice import AnyLattice, Interpolation
 from ..reflectance.origin import Link, Source
 from ..system.errors import MaterialError
 from .palette import Palette, Reflectances
+from .smrl.notes import FACTS
 
 
 class SomManBrdf(OnLattice):
@@ -64,7 +65,7 @@ class SomManBrdf(OnLattice):
     @property
     def facts(self) -> dict[str, Any]:
         """Those of what was compressed."""
-        return dict(self.options.get("source_facts", {}))
+        return dict(self.options.get(FACTS, {}))
 
     @property
     def counts(self) -> Counts:

@@ -30,8 +30,6 @@ from .format import Format
 from .spectra import srgb_weights
 
 LARGEST_SIDE = 4096  # of any grid in a file
-MOST_ANGLES = 1024
-MOST_WAVELENGTHS = 4096
 LARGEST = 1e30  # renderers calculate in single precision
 SMALLEST_COSINE = 0.01  # that a stored f_r cos θ_o is divided by
 NORMAL = 1e-14  # viewers with a smaller sin² θ are at the normal, and have no azimuth

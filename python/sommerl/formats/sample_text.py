@@ -24,6 +24,7 @@ from .text import text_of
 
 DELIMITERS = ("\t", ";", ",", "|", None)  # None: spaces
 NOTHING = {"", "nan", "na", "n/a", "#n/a", "n.a.", "-", "--", "—", "null", "none", "inf", "-inf", "+inf", "infinity"}
+FEWEST_NUMBERS = 3  # of a row, even if some are missing; fewer may be how many rows there are
 MOST_TRIED = 200  # lines after the preamble in which the first row of numbers is looked for
 END_OF_LINE = re.compile(r"\r\n|\r|\n")
 HINT = re.compile("th|ph|θ|ϑ|φ|ϕ|az|zen|polar|incl|angle|aoi|vza", re.IGNORECASE)  # in all names of angles
@@ -66,7 +67,7 @@ def table(path: Path, data: bytes, wanted: Callable[[Sequence[str]], list[int]],
     units = [""] * len(names)
     if not rows:
         raise FormatError(f"{path}: line {at + 1}: expected rows of numbers below the names of columns, found none")
-    start, delimiter = _first_row(path, rows, len(names), delimiter, must_be=not given)
+    start, delimiter = _first_row(path, rows, len(names), delimiter, named=not given)
     if found and not given and start:
         cells = _split(rows[start - 1][1], delimiter)
         if len(cells) == len(names) and all(map(columns.is_unit, cells)):
@@ -127,12 +128,16 @@ def _plain(lines: Sequence[str], start: int) -> Iterator[tuple[int, str]]:
 
 
 def _first_row(
-    path: Path, rows: Sequence[tuple[int, str]], count: int, delimiter: str | None, *, must_be: bool
+    path: Path, rows: Sequence[tuple[int, str]], count: int, delimiter: str | None, *, named: bool
 ) -> tuple[int, str | None]:
-    """The place of the first row of numbers, and what separates its cells."""
+    """The place of the first row of numbers, and what separates its cells.
+
+    named: whether the file names the columns, and does so above `rows`. Then, numbers that are more or fewer than the
+    names are a row with a mistake, and no preamble.
+    """
     order = [delimiter, *(each for each in DELIMITERS if each != delimiter)]
-    first = ""
-    for place, (number, line) in enumerate(rows if not must_be else rows[:MOST_TRIED]):
+    first, mistaken = "", False
+    for place, (number, line) in enumerate(rows[:MOST_TRIED] if named else rows):
         for each in order:
             cells = _split(line, each)
             found = [cell for cell in cells if _number(cell, each) is not None]
@@ -140,8 +145,10 @@ def _first_row(
                 continue
             if len(cells) == count:
                 return place, each
-            if not first:
-                first = f"line {number}: expected {count} columns, found {len(cells)}"
+            first = first or f"line {number}: expected {count} columns, found {len(cells)}"
+            mistaken = mistaken or (named and len(found) >= FEWEST_NUMBERS)
+        if mistaken:
+            break
     if not first:
         first = f"line {rows[0][0]}: expected a row of {count} numbers, found {rows[0][1].strip()[:40]!r}"
     raise FormatError(f"{path}: {first}")

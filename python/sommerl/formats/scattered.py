@@ -41,9 +41,7 @@ HORIZON = 1e-6  # cosines up to that are at the horizon
 REACH_DEGREES = 10.0
 REACH = np.radians(REACH_DEGREES)  # of a sample: pairs farther from all of them count as not measured
 COVERAGE = Lattice(36, 30, 60)  # where that is looked at
-COARSEST = np.radians(
-    5.0
-)  # of a grid's usual steps in θ_i; between those of coarser ones, highlights would be seen twice
+COARSEST = np.radians(5.0)  # of a grid's usual steps in θ_i; of coarser ones, highlights would be seen twice
 NODES_A_SAMPLE, FEWEST_NODES, MOST_NODES = 20, 15_000, 60_000  # of the lattice
 SAME = 1e-4  # samples whose coordinates agree to that are one, measured several times
 MOST_SAMPLES = 2_000_000

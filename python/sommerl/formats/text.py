@@ -50,25 +50,20 @@ def uncommented(text: str) -> list[str]:
     return [line for line in (line.split("#")[0].strip() for line in text.splitlines()) if line]
 
 
-def rows(
-    path: Path, lines: list[str], columns: int, delimiter: str | None = None, used: list[int] | None = None
-) -> NDArray[np.float64]:
-    """The numbers in lines of text, shape (lines, columns). Raises FormatError where a line has other columns.
-
-    columns: how many a line has. delimiter: what separates them; None for spaces. used: the numbers of the columns that
-        are wanted, which are then those of the result; None for all.
+def rows(path: Path, lines: list[str], columns: int) -> NDArray[np.float64]:
+    """The numbers in lines of text, with spaces between them, shape (lines, columns). Raises FormatError where a line
+    has other columns.
     """
-    if any(len(line.split(delimiter)) != columns for line in (*lines[:1], *lines[-1:])):
-        found = next(n for line in (lines[0], lines[-1]) if (n := len(line.split(delimiter))) != columns)
+    if any(len(line.split()) != columns for line in (*lines[:1], *lines[-1:])):
+        found = next(n for line in (lines[0], lines[-1]) if (n := len(line.split())) != columns)
         raise FormatError(f"{path}: expected rows of {columns} columns, found {found}")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of no rows at all, which are told below
-            numbers = np.loadtxt(lines, np.float64, delimiter=delimiter, usecols=used, quotechar='"', ndmin=2)
+            numbers = np.loadtxt(lines, np.float64, quotechar='"', ndmin=2)
     except ValueError as error:
         raise FormatError(f"{path}: expected rows of {columns} numbers, found others ({error})") from error
-    wanted = columns if used is None else len(used)
-    if not numbers.size or numbers.shape[1] != wanted:
+    if not numbers.size or numbers.shape[1] != columns:
         raise FormatError(
             f"{path}: expected rows of {columns} numbers, found {numbers.shape[1] if numbers.size else 0}"
         )

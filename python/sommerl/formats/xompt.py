@@ -27,7 +27,8 @@ from ..system.errors import FormatError, MaterialError
 from ..system.files import atomic_write
 from ..system.visible import visible
 from .format import Format
-from .grids import axes_of, on_grid, regular
+from .grids import Axes, axes_of, on_grid, regular
+from .meant import as_f_r
 from .reading import asked
 from .scattered import from_samples
 from .spectra import PRIMARIES, WRITTEN, to_rgb
@@ -68,16 +69,27 @@ def parse(path: Path, file: door.File) -> Brdf:
     directions, spectra, wavelengths, facts = _spectra(path, rows)
     f_r = to_rgb(spectra, wavelengths * 1e9)
     named: dict[str, Any] = {"name": visible(path.stem), "source_sha256": digest.hexdigest()}
-    theta_i, theta_o, phi = directions.T
-    found = regular(theta_i, theta_o, phi, f_r)
     try:
-        if found:
+        if found := _grid(directions, f_r):
             axes, values = found
             return GridBrdf(*axes, values, facts=facts, **named)
-        angles = np.insert(directions, 1, 0.0, axis=1)  # φ_i
-        return from_samples(Samples.at_angles(angles, f_r), facts=facts, **named)
+        return from_samples(_samples(directions, f_r), facts=facts, **named)
     except (FormatError, MaterialError) as error:
         raise FormatError(f"{path}: {error}") from error
+
+
+def _grid(directions: Table, f_r: Table) -> tuple[Axes, Table] | None:
+    """The axes and f_r of values on a whole grid, meant as `reading.asked` says; None if they are not on one, or are to
+    be completed by a prior."""
+    how = asked()
+    theta_i, theta_o, phi = directions.T
+    around = phi + np.pi if how.phi_from == "specular" else phi
+    meant = f_r if how.values == "f_r" else as_f_r(_samples(directions, f_r), how).f_r
+    return None if how.prior else regular(theta_i, theta_o, around, meant)
+
+
+def _samples(directions: Table, f_r: Table) -> Samples:
+    return Samples.at_angles(np.insert(directions, 1, 0.0, axis=1), f_r)  # φ_i
 
 
 def _parts(path: Path, file: door.File, digest: Any) -> tuple[Table, bytes]:

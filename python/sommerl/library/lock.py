@@ -64,12 +64,13 @@ WHOLE = Shard()
 class Lock:
     """The part of a library's folder that this process may write."""
 
-    def __init__(self, handle: int) -> None:
-        self._handle = handle
+    def __init__(self, handle: int, *, works: bool) -> None:
+        self._handle, self._works = handle, works
 
     def widened(self) -> bool:
-        """Whether nobody else is building; if so, nobody else can begin until the lock is given back."""
-        return _taken(self._handle, WHOLE)
+        """Whether nobody else is building; if so, nobody else can begin until the lock is given back. Where the file
+        system has no locks, nobody is known to be, and whoever builds has been told to see to it."""
+        return not self._works or _taken(self._handle, WHOLE)
 
 
 @contextmanager
@@ -80,6 +81,7 @@ def locked(folder: Path, shard: Shard, warn: Callable[[str], None]) -> Generator
     Raises MaterialError if somebody else is at work there, OSError if the folder cannot be written to.
     """
     path = folder / INSIDE / "lock"
+    works = True
     handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0), 0o666)
     try:
         try:
@@ -88,12 +90,12 @@ def locked(folder: Path, shard: Shard, warn: Callable[[str], None]) -> Generator
             if error.errno not in NO_LOCKS:
                 raise OSError(error.errno, error.strerror, str(path)) from error
             warn(f"{folder}: expected a file system with locks, found none: see to it that no other build writes here")
-            taken = True
+            taken, works = True, False
         if not taken:
             raise MaterialError(f"{folder}: expected no other build in it, found {_owner(folder, shard)}")
         own = _name_owner(folder, shard)
         try:
-            yield Lock(handle)
+            yield Lock(handle, works=works)
         finally:
             with suppress(OSError):
                 own.unlink()

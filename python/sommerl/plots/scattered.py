@@ -10,12 +10,12 @@ import numpy as np
 from ..formats.compared import relative_errors
 from ..formats.gridded import angles_of
 from ..formats.prior import Estimate
-from ..formats.scattered import COVERAGE, REACH, ScatteredBrdf
+from ..formats.scattered import COVERAGE, REACH_DEGREES, ScatteredBrdf
 from ..reflectance.arrays import split
 from ..reflectance.brdf import Brdf
 from ..reflectance.half_diff import half_diff, spherical
 from ..reflectance.samples import Samples
-from .page import matplotlib, save, text
+from .page import THETA_H_TICKS, matplotlib, save, text
 from .style import plain_style
 
 INCIDENCES = (10, 45, 75)  # degrees
@@ -38,7 +38,7 @@ def coverage(brdf: ScatteredBrdf, path: Path, written: Brdf | None = None) -> No
         share = f"{brdf.facts['coverage']:.1%} of all pairs of directions (by solid angles and cosines)"
         named = f"{text(brdf.name)}: {len(brdf.samples.wi)} samples"
         figure.suptitle(
-            f"{named}; {share} within {np.degrees(REACH):.0f}° of one (yellow)",
+            f"{named}; {share} within {REACH_DEGREES:.0f}° of one (yellow)",
             fontsize=11,
         )
         _slices(figure.add_subplot(2, 4, 1), brdf)
@@ -119,8 +119,7 @@ def _slices(ax: Any, brdf: ScatteredBrdf) -> None:
     ax.plot(
         np.degrees(theta_d), np.sqrt(theta_h * 2 / np.pi), ".", color="white", markersize=_size(brdf.samples), alpha=0.5
     )
-    ticks = np.array([0, 1, 5, 15, 30, 50, 90])
-    ax.set_yticks(np.sqrt(ticks / 90), [f"{tick}°" for tick in ticks])
+    ax.set_yticks(np.sqrt(np.array(THETA_H_TICKS) / 90), [f"{tick}°" for tick in THETA_H_TICKS])
     ax.set(xlabel="θ_d [°]", ylabel="θ_h", title="share of φ_d", xlim=(0, 90), ylim=(0, 1))
     ax.figure.colorbar(image, ax=ax)
 

@@ -17,14 +17,13 @@ from ..reflectance.table import BrdfTable
 from ..render.judge import Judge
 from . import field, fits, times
 from .cells import Cell, Outcome, Setting
-from .data import RULES
+from .data import DEFAULT, PRINTED, RULES
 from .methods import METHODS
 from .printed import printed
 from .section import Item, Ours, Outcomes, Section, Table
 
 BLUE = "blue-metallic-paint"
 NOISY = (BLUE, "nickel", "beige-fabric")
-DEFAULT, PRINTED = RULES
 TRUTH, NOISE, OURS = "the noisy table", "noise", "ours"
 COUNTS = (1, 10, 100, 1000)  # of materials in memory
 SEED = 1  # of the noise
@@ -39,7 +38,7 @@ def noise(setting: Setting, material: str) -> Outcome:
     found: dict[str, Brdf] = {TRUTH: table}
     for m in setting.extent.clusters:
         found[f"M = {m}"] = setting.learnt(table, m).with_interpolation("trilinear")
-        found[f"M = {m}, Eq. 2 as printed"] = setting.learnt(table, m, **RULES[PRINTED]).with_interpolation("trilinear")
+        found[f"M = {m}, {PRINTED}"] = setting.learnt(table, m, **RULES[PRINTED]).with_interpolation("trilinear")
     for size in setting.some(SIZES):
         found[f"compact, {size:,} B"] = compress(table, CompactOptions(target_size=size))[0]
     return Outcome({name: _distance(clean, judge, brdf) for name, brdf in found.items()})

@@ -37,6 +37,7 @@ class Learnt(TypedDict, total=False):
 
 #: By what they are called. The paper prints no rate for its equation; docs/method.md has the experiment.
 RULES: dict[str, Learnt] = {"default": {}, "Eq. 2 as printed": {"rule": "paper", "alpha": 0.5}}
+DEFAULT, PRINTED = RULES
 
 
 @dataclass(frozen=True)

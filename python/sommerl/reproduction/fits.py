@@ -16,14 +16,14 @@ from ..fitting import Fit, FitOptions, fit_models
 from ..reflectance.brdf import Brdf
 from ..reflectance.table import BrdfTable
 from .cells import Cell, Outcome, Setting
-from .data import RULES
+from .data import DEFAULT, PRINTED, RULES
 from .printed import printed
+from .runner import values
 from .section import Item, Ours, Outcomes, Section, Table, compared, decibels, pictured, shown
 
 CLUSTERS = 1000
 GREEN = "green-metallic-paint"
 TABLE = "the table"
-DEFAULT, PRINTED = RULES
 
 
 def table1(setting: Setting, material: str, model: str) -> Outcome:
@@ -65,7 +65,7 @@ def _plan1(setting: Setting) -> Sequence[Cell]:
 
 
 def _show1(setting: Setting, outcomes: Outcomes) -> Section:
-    found = {name[len("table1/") :]: each.values for name, each in outcomes.items() if name.startswith("table1/")}
+    found = values(outcomes, "table1/")
     ours: dict[str, Ours] = {}
     for name, each in found.items():
         ours[f"{name}/table"] = Ours(name, each[TABLE])

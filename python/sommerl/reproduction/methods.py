@@ -26,7 +26,7 @@ from ..reflectance.lattice import Interpolation
 from ..reflectance.table import BrdfTable
 from ..render.judge import Judge, score
 from ..system import door
-from .data import RULES, Data
+from .data import PRINTED, RULES, Data
 from .model_fits import GGX_PARAMETERS, SGD_PARAMETERS, fitted_ggx, fitted_sgd
 
 NUMBER = 4  # bytes: float32
@@ -145,7 +145,6 @@ def own_file(source: Source) -> Stored | None:
     )
 
 
-EQ2 = "Eq. 2 as printed"
 METHODS: dict[str, Method] = {
     **{
         f"compact-{size}": Method(f"compact, at most {size:,} B", "compact", partial(compact, size=size), cost)
@@ -158,7 +157,7 @@ METHODS: dict[str, Method] = {
         partial(paper, options=TrainOptions(), interpolation="trilinear"),
     ),
     "paper-printed": Method(
-        f"paper, M = {CLUSTERS}, {EQ2}", f"paper, {EQ2}", partial(paper, options=TrainOptions(**RULES[EQ2]))
+        f"paper, M = {CLUSTERS}, {PRINTED}", f"paper, {PRINTED}", partial(paper, options=TrainOptions(**RULES[PRINTED]))
     ),
     "paper-1000": Method("paper, M = 1000", "paper", partial(paper, options=TrainOptions(clusters=1000)), 7.0),
     "som": Method(f"SOM without MAN, M = {CLUSTERS}", "SOM without MAN", weights),

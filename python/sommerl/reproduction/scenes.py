@@ -15,13 +15,12 @@ from ..render.passes import render_all
 from ..render.scenes import statue, still_life
 from ..sampling.half_vector import HalfVectorSampler
 from .cells import Cell, Outcome, Setting
-from .data import RULES
+from .data import DEFAULT, PRINTED, RULES
 from .section import Item, Ours, Outcomes, Section, decibels, pictured, shown
 
 BLUE = "blue-metallic-paint"
 PLACES = ("nickel", "yellow-matte-plastic", BLUE)  # of Fig. 7
 CLUSTERS = {"nickel": 1000, "yellow-matte-plastic": 1000, BLUE: 256}
-DEFAULT, PRINTED = RULES
 LAWRENCE, WARD = "Lawrence", "Ward, 3 lobes"
 
 

@@ -11,12 +11,11 @@ from ..compression.smrl.file import encode
 from ..factored import file as factored_file
 from ..formats import merl
 from .cells import Cell, Outcome, Setting
-from .data import RULES
+from .data import DEFAULT, RULES
 from .section import Item, Ours, Outcomes, Section, Table
 
 BLUE = "blue-metallic-paint"
 CLUSTERS = (64, 256, 1000)
-DEFAULT, PRINTED = RULES
 MIB, KB = 2**20, 1e3
 
 

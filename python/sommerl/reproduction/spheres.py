@@ -14,14 +14,13 @@ from ..reflectance.brdf import Brdf
 from ..render.compare import Comparison
 from ..render.metrics import exposure, psnr, to_srgb8
 from .cells import Cell, Outcome, Setting
-from .data import RULES
+from .data import DEFAULT, PRINTED, RULES
 from .printed import printed
 from .runner import values
 from .section import Item, Ours, Outcomes, Picture, Section, Table, compared, decibels, pictured, shown
 
 YELLOW, BLUE = "yellow-matte-plastic", "blue-metallic-paint"
 CASES = ((64, 10), (64, 30), (64, 50), (1000, 30))  # M and epochs of Fig. 4
-DEFAULT, PRINTED = RULES  # what the two ways of learning are called
 SOM_MAN = "som-man"
 EXPOSURES = (1.0, 0.5, 0.25, 0.125)  # relative to ours
 NEAR = 0.5  # dB, of a printed number

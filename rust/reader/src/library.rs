@@ -248,7 +248,8 @@ fn read_common(bytes: &[u8], count: usize) -> Option<(Vec<String>, Vec<String>)>
         match key {
             "metrics" => json.list(|json| {
                 let name = json.string()?;
-                let fine = name.len() <= 100 && metrics.len() < 64 && !metrics.iter().any(|other| other == name);
+                let fine =
+                    name.chars().count() <= 100 && metrics.len() < 64 && !metrics.iter().any(|other| other == name);
                 metrics.push(name.into());
                 fine.then_some(())
             }),

@@ -1,16 +1,14 @@
 /** f_r over θ_h and θ_d at one φ_d, as an image, with the cells or nodes that are looked up. */
-import { cellAbove, cellAt, entriesAt, evaluate, places, range } from "./evaluate.js";
+import { FINE, HALF_PI, ON_HORIZON, cellAbove, cellAt, entriesAt, evaluate, places, range } from "./evaluate.js";
 import { Chart, Drawing, discs, frame, inDegrees, label, late, number, polyline, reflectance, rich, toned } from "./draw.js";
 import { make, slider } from "./dom.js";
 import { DEGREE } from "./vectors.js";
 
-const HALF_PI = Math.PI / 2;
 const SIDE = 120; // pixels of what has no cells
 const MOST = 180; // pixels of what has
 const XS = [0, 1, 5, 15, 30, 50, 90].map((t) => [Math.sqrt(t / 90), `${t}°`]);
 const YS = [0, 15, 30, 45, 60, 75, 90].map((t) => [t / 90, `${t}°`]);
 const [LEFT, TOP, RIGHT, FOOT] = [32, 28, 10, 34];
-const ON_HORIZON = 1e-12;
 const WHITE = 0.93; // the quantile of what is shown that becomes white: a few values near grazing angles may be huge
 const KEPT = 24; // images
 
@@ -54,15 +52,15 @@ export function* sliced(material, phiD, columns, rows) {
 
 /** The nodes at the φ_d nearest to one, as {at, a: √(θ_h / 90°), b: θ_d / 90°}. */
 export function nodesOf(lattice, phiD) {
-    const z = (phiD * 180) / range(lattice);
-    const gap = (place) => (lattice.mirrored ? Math.abs(place - z) : Math.min(Math.abs(place - z), 180 - Math.abs(place - z)));
+    const z = (phiD * FINE) / range(lattice);
+    const gap = (place) => (lattice.mirrored ? Math.abs(place - z) : Math.min(Math.abs(place - z), FINE - Math.abs(place - z)));
     const found = [];
     let first = 0;
     lattice.thetaH.forEach((x, row) => {
         const [theta, phi] = [lattice.thetaD[lattice.band[row]], lattice.phiD[lattice.band[row]]];
         const p = phi.reduce((best, place, i) => (gap(place) < gap(phi[best]) ? i : best), 0);
         const a = x < 90 ? x / 360 : 0.25 + (x - 90) / 120;
-        theta.forEach((y, i) => found.push({ at: first + i * phi.length + p, a, b: y / 180 }));
+        theta.forEach((y, i) => found.push({ at: first + i * phi.length + p, a, b: y / FINE }));
         first += theta.length * phi.length;
     });
     return found;
