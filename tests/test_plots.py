@@ -276,7 +276,7 @@ def test_without_matplotlib(monkeypatch):
     import sommerl.system.optional
 
     def missing(module):
-        raise ImportError(module)
+        raise ModuleNotFoundError(module)
 
     monkeypatch.setattr(sommerl.system.optional.importlib, "import_module", missing)
     with pytest.raises(MissingDependencyError, match="plots: matplotlib is needed and not installed"):
