@@ -165,7 +165,7 @@ def test_bad_samples(change, sentence):
 
 def test_scipy_is_asked_for_by_a_sentence(monkeypatch):
     def missing(name):
-        raise ImportError(name)
+        raise ModuleNotFoundError(name)
 
     monkeypatch.setattr("sommerl.system.optional.importlib.import_module", missing)
     with pytest.raises(MissingDependencyError, match=r"pip install 'sommerl\[lab\]'"):
