@@ -126,3 +126,17 @@ def test_nan_and_infinities_are_clamped_and_counted(tmp_path):
     path = tmp_path / "holes.binary"
     path.write_bytes(raw(planes=planes))
     assert load(path).counts.cells_clamped == 3
+
+
+def test_nan_that_signals_is_as_any_other(tmp_path):
+    """Also below the horizon, where nobody reads it: no warning comes."""
+    planes = np.ones((3, *MERL.shape))
+    signals = np.array(0x7FF0000000000001, np.uint64).view(np.float64)
+    planes[0][~MERL.above_horizon] = signals
+    with pytest.raises(FloatingPointError), np.errstate(invalid="raise"):
+        planes * 2.0  # so it does signal
+    (tmp_path / "x.binary").write_bytes(raw(planes=planes))
+    table = load(tmp_path / "x.binary")
+    assert table.counts.cells_clamped == 0
+    merl.write(table, tmp_path / "y.binary")
+    assert (tmp_path / "y.binary").read_bytes() == (tmp_path / "x.binary").read_bytes()

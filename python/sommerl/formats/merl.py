@@ -101,7 +101,8 @@ def write(table: BrdfTable, path: str | Path) -> None:
 
 def _scaled(planes: NDArray[np.float64]) -> NDArray[np.float64]:
     """f_r of a file's planes, of the lattice's shape + (3,)."""
-    return np.moveaxis(planes, 0, -1) * SCALE
+    with np.errstate(invalid="ignore"):  # of NaN that signals
+        return np.moveaxis(planes, 0, -1) * SCALE
 
 
 def _reachable(lattice: Lattice) -> NDArray[np.bool_]:
