@@ -82,10 +82,12 @@ def _grid(directions: Table, f_r: Table) -> tuple[Axes, Table] | None:
     """The axes and f_r of values on a whole grid, meant as `reading.asked` says; None if they are not on one, or are to
     be completed by a prior."""
     how = asked()
+    if how.prior:
+        return None
     theta_i, theta_o, phi = directions.T
     around = phi + np.pi if how.phi_from == "specular" else phi
     meant = f_r if how.values == "f_r" else as_f_r(_samples(directions, f_r), how).f_r
-    return None if how.prior else regular(theta_i, theta_o, around, meant)
+    return regular(theta_i, theta_o, around, meant)
 
 
 def _samples(directions: Table, f_r: Table) -> Samples:

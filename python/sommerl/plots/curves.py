@@ -12,7 +12,7 @@ from ..reflectance.brdf import Brdf
 from ..reflectance.cells import HALF_PI, ON_HORIZON
 from ..reflectance.half_diff import directions, spherical
 from ..system.errors import MaterialError
-from .page import STYLES, THETA_H_TICKS, Materials, colours, legend, matplotlib, named
+from .page import STYLES, THETA_H_TICKS, Materials, colours, legend, matplotlib, named, upright
 
 INCIDENCES = tuple(np.radians((0, 30, 60, 80)).tolist())
 DIFFERENCES = tuple(np.radians((0, 30, 60, 75)).tolist())
@@ -37,14 +37,10 @@ def lobes(ax: Any, brdf: Materials, theta_i: Sequence[float] = INCIDENCES) -> No
     materials = named(brdf)
     curves = [[_lobe(one, angle) for angle in angles] for _, one in materials]
     low, peak = _extremes(np.concatenate([f_r for curve in curves for _, f_r in curve]))
-    floor = low / max(
-        (peak / low) ** (1 / 3), 10.0
-    )  # the darkest values lie at a quarter of the radius, or a decade above the centre
+    # The darkest values lie at a quarter of the radius, or a decade above the centre.
+    floor = low / max((peak / low) ** (1 / 3), 10.0)
     top = peak * (peak / floor) ** 0.06
-    ax.set_theta_zero_location("N")
-    ax.set_theta_direction(-1)
-    ax.set_rscale("log")
-    ax.minorticks_off()  # of a radius, which nobody sees, and which take longer than all the rest
+    upright(ax)
     for curve, style in zip(curves, STYLES, strict=False):
         for (theta_o, f_r), colour in zip(curve, colours(len(angles)), strict=True):
             ax.plot(theta_o, np.maximum(f_r, floor), color=colour, linestyle=style, linewidth=1.2)

@@ -69,6 +69,14 @@ def number(value: float) -> str:
     return np.format_float_positional(value, 3, unique=False, fractional=False, trim="-")
 
 
+def upright(ax: Any) -> None:
+    """Makes polar axes those of a lobe: the normal is at the top, angles grow clockwise, and radii are logarithmic."""
+    ax.set_theta_zero_location("N")
+    ax.set_theta_direction(-1)
+    ax.set_rscale("log")
+    ax.minorticks_off()  # of the radius: nobody sees them, and they take longer than all the rest
+
+
 def colours(count: int) -> list[Any]:
     """Colours for increasing angles, from dark to light, all dark enough to be seen on white."""
     return list(matplotlib("matplotlib").colormaps["viridis"](np.linspace(0, 0.85, count)))

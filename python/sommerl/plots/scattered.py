@@ -15,7 +15,7 @@ from ..reflectance.arrays import split
 from ..reflectance.brdf import Brdf
 from ..reflectance.half_diff import half_diff, spherical
 from ..reflectance.samples import Samples
-from .page import THETA_H_TICKS, matplotlib, save, text
+from .page import THETA_H_TICKS, matplotlib, save, text, upright
 from .style import plain_style
 
 INCIDENCES = (10, 45, 75)  # degrees
@@ -65,10 +65,7 @@ def cut(ax: Any, samples: Samples, brdf: Brdf, theta_i: float, estimate: Estimat
     curve, dots = brdf.eval(wi, wo).mean(axis=-1), samples.f_r[those].mean(axis=1)
     top = float(max(curve.max(), dots.max(initial=0.0), 1e-12)) * 1.2
     floor = max(float(np.percentile(curve[curve > 0], 2)) if (curve > 0).any() else 0.0, top * DEEPEST) / 3
-    ax.set_theta_zero_location("N")
-    ax.set_theta_direction(-1)
-    ax.set_rscale("log")
-    ax.minorticks_off()  # of a radius, which nobody sees, and which take longer than all the rest
+    upright(ax)
     ax.plot(theta, np.maximum(curve, floor), linewidth=1.0)
     if estimate is not None:
         factor = np.exp(estimate.deviation_at(np.broadcast_to(wi, wo.shape), wo))
